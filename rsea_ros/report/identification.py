@@ -67,9 +67,7 @@ def _blocks(i: Identification) -> Iterator[html.Block]:
             (f"{i.duration:.0f} s", f"of data at {i.rate:.0f} Hz"),
         ])  # fmt: skip
     if following := next_command(i):
-        yield html.paragraph(
-            html.Html(f'<p class="next">To find the cause and its gain: {html.code(following)}</p>')
-        )
+        yield html.Html(f'<p class="next">To find the cause and its gain: {html.code(following)}</p>')
     yield rigs.right_rig_block(i.remarks)
     yield _parameters(i.parameters)
     if i.statics is not None:
@@ -111,13 +109,12 @@ def _parameters(parameters: Sequence[ParameterEstimate]) -> html.Html:
 def _clock_sentence(parameters: Sequence[ParameterEstimate]) -> str:
     """Return the time offsets of the sensors; empty if all stamps may be correct."""
     parts = [
-        f"{words.channel(p.name.split('.')[1])} {words.quantity(p.value, p.unit, 2)} (95 %: "
-        f"{words.quantity(p.ci95[0], p.unit, 2)} to "
-        f"{words.quantity(p.ci95[1], p.unit, 2)}){' of the time passed' if p.unit == 'ppm' else ''}"
+        f"{words.channel(p.name.split('.')[1])} {words.measured_text(p.value, *p.ci95, p.unit)}"
+        f"{' of the time passed' if p.unit == 'ppm' else ''}"
         for p in parameters
         if p.name.startswith(CLOCKS) and not p.ci95[0] <= 0.0 <= p.ci95[1]
     ]
-    return f"Sensors read later than their stamps by: {'; '.join(parts)}." if parts else ""
+    return f"Sensors read later than their stamps by (95 %): {'; '.join(parts)}." if parts else ""
 
 
 def parameter_table(parameters: Sequence[ParameterEstimate]) -> html.Html:
@@ -233,7 +230,7 @@ def _verdict(identification: Identification) -> str:
     if not ratios:
         return f"No channel to test the model with ({rig})"
     worst = max(ratios, key=lambda n: ratios[n])
-    size = f"{words.channel(worst)} {times(ratios[worst])} times the noise ({rig})"
+    size = f"{words.channel(worst)} {words.times(ratios[worst])} times the noise ({rig})"
     if lost := explained_by_lost_cycles(identification):
         return f"The model does not fit: {size}; {lost} lost cycles of the driver are the likely cause"
     if not identification.at_noise:
@@ -244,11 +241,6 @@ def _verdict(identification: Identification) -> str:
     if identification.verdict == "not_identifiable":
         return f"The model fits: {size}; but these data determine none of its values"
     return f"The model fits: {size}"
-
-
-def times(ratio: float) -> str:
-    """Return a ratio, rounded so that it stays on its side of the limit."""
-    return f"{ratio:.2f}" if ratio < 2.0 else f"{ratio:.2g}" if ratio < 100.0 else f"{ratio:.0f}"
 
 
 def next_command(identification: Identification) -> str:

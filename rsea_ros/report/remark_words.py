@@ -1,7 +1,7 @@
 """Faults of the data, and the remarks of a fit or a diagnosis, in words."""
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from rsea_ros.documents.wording import list_names
 from rsea_ros.identification.result import Code, Remark
@@ -21,7 +21,7 @@ def fault(*alike: Fault) -> str:
         return f"{names} {'are' if len(channels) > 1 else 'is'} missing"
     detail = f" ({f.detail})" if f.detail else ""
     place = f" in {names}" if f.channel else ""
-    return f"{'NaN' if f.kind == 'nan' else f.kind.replace('_', ' ')}{place}{_size(f)}{detail}"
+    return f"{words.fault(f.kind)}{place}{_size(f)}{detail}"
 
 
 def _size(f: Fault) -> str:
@@ -39,19 +39,15 @@ def fault_lines(items: Sequence[Fault]) -> list[str]:
     return [fault(*alike) for alike in groups.values()]
 
 
-def found_faults(faults: Iterable[Fault], named: Callable[[str], str] = words.channel) -> str:
-    """Return which faults the data have, each kind once, and of which samples are masked; each after a space.
-
-    named: the name of a channel, as it is written.
-    """
-    kinds: dict[str, list[str]] = {}
+def found_faults(faults: Iterable[Fault]) -> str:
+    """Return which faults the data have, each kind once, and which samples are masked; each after a space."""
+    kinds: dict[str, dict[str, None]] = {}
     for f in faults:
-        channels = kinds.setdefault(f.kind, [])
-        channels += [] if named(f.channel) in channels else [named(f.channel)]
+        kinds.setdefault(f.kind, {})[words.channel(f.channel)] = None
     texts: dict[bool, list[str]] = {False: [], True: []}
     for kind, channels in kinds.items():
-        names = list_names(channels)
-        text = f"{names} missing" if kind == "missing_topic" else f"{kind.replace('_', ' ')} in {names}"
+        names = list_names([*channels])
+        text = f"{names} missing" if kind == "missing_topic" else f"{words.fault(kind)} in {names}"
         texts[kind in MASKED].append(text)
     openings = (" The data have faults", " Samples were masked")
     return "".join(f"{o}: {'; '.join(t)}." for o, t in zip(openings, texts.values(), strict=True) if t)

@@ -50,6 +50,11 @@ def effect(name: str) -> str:
     return " ".join(_PROPER.get(word, word) for word in name.split("_"))
 
 
+def fault(kind: str) -> str:
+    """Return the plain name of a kind of fault of the data."""
+    return "NaN" if kind == "nan" else kind.replace("_", " ")
+
+
 def channel(name: str) -> str:
     """Return the plain name of a channel."""
     return CHANNELS.get(name, name)
@@ -106,6 +111,11 @@ def unit_factor(value: float, of: str) -> tuple[float, str]:
         return 1.0, unit(of)
     factor, prefix = next((p for p in _PREFIXES if abs(value) >= 0.999 * p[0]), _PREFIXES[-1])
     return 1.0 / factor, f"{prefix}{unit(of)}"
+
+
+def times(ratio: float) -> str:
+    """Return a ratio, such as of a residual to its noise, rounded so that it stays on its side of a limit."""
+    return f"{ratio:.2f}" if ratio < 2.0 else f"{ratio:.2g}" if ratio < 100.0 else f"{ratio:.0f}"
 
 
 def span(low: float, high: float, of: str) -> str:

@@ -74,9 +74,9 @@ def test_a_channel_that_two_records_lack_is_named_once():
 
 
 def test_only_what_is_masked_is_called_masked():
-    assert found_faults([NAN]) == " Samples were masked: nan in F/T torque."
-    names = "position, velocity and motor_torque"
-    assert found_faults(DISORDER, str) == f" The data have faults: out of order in {names}."
+    assert found_faults([NAN]) == " Samples were masked: NaN in F/T torque."
+    names = "position, velocity and motor torque"
+    assert found_faults(DISORDER) == f" The data have faults: out of order in {names}."
     missing = [Fault("missing_topic", name, 1.0) for name in ("velocity", "position", "velocity")]
-    assert found_faults(missing, str) == " The data have faults: velocity and position missing."
-    assert found_faults([*DISORDER, NAN], str).endswith(" Samples were masked: nan in ft.")
+    assert found_faults(missing) == " The data have faults: velocity and position missing."
+    assert found_faults([*DISORDER, NAN]).endswith(" Samples were masked: NaN in F/T torque.")

@@ -62,7 +62,7 @@ def headline(diagnosis: Diagnosis) -> str:
 def diagnosis_sentence(diagnosis: Diagnosis) -> str:
     """Return the verdict with its numbers, values that are not the rig's, and faults of the data."""
     off = words.sentence(values_off(diagnosis.remarks))
-    return f"{_verdict(diagnosis)[1]}.{f' {off}.' if off else ''}{found_faults(diagnosis.faults, str)}"
+    return f"{_verdict(diagnosis)[1]}.{f' {off}.' if off else ''}{found_faults(diagnosis.faults)}"
 
 
 def _verdict(d: Diagnosis) -> tuple[str, str]:
@@ -81,11 +81,9 @@ def _verdict(d: Diagnosis) -> tuple[str, str]:
         title = f"{words.sentence(silent)} measures nothing; in the other channels only noise is left"
         return title, f"The {silent} measures nothing and is left out; with the model's values {at_floor}"
     if d.verdict == "unexplained":
-        # never rounded to the floor
-        near = f"{math.ceil(100.0 * before) / 100.0:.2f}" if before < 2.0 else ""
-        size = f"The {name} residual is {{}} times the noise"
-        title = f"{size.format(near or _digits(before))}, and no effect of the catalogue explains it"
-        return title, f"{size.format(near or f'{before:.1f}')}; no known effect explains it"
+        left = words.times(math.ceil(100.0 * before) / 100.0 if before < 2.0 else before)  # not to the floor
+        size = f"The {name} residual is {left} times the noise"
+        return f"{size}, and no effect of the catalogue explains it", f"{size}; no known effect explains it"
     explains, pronoun = ("explain", "them") if len(d.causes) > 1 else ("explains", "it")
     rest, part = _noise_left(d, "only noise"), "part" if after < before else "no part"
     if d.verdict == "explained":
@@ -94,9 +92,9 @@ def _verdict(d: Diagnosis) -> tuple[str, str]:
         how, end = f"probably {explains} the misfit", ", but another law may do the same"
     else:
         how, rest, end = f"{explains} {part} of the misfit", "the rest stays unexplained", "; " + _rest(d)
-    left = f"{after:.2f}" if d.at_noise_floor or d.verdict == "explained" else _near(after)
+    left = f"{after:.2f}" if d.at_noise_floor or d.verdict == "explained" else words.times(after)
     named = list_names([words.effect(c.name) for c in d.causes])
-    falls = f"falls from {before:.1f} to {left}" if after < before else f"stays at {left}"
+    falls = f"falls from {words.times(before)} to {left}" if after < before else f"stays at {left}"
     fall = f"with {pronoun} the {name} residual {falls} times the noise"
     title = f"{cause_list(d.causes)} {how}; {rest}"
     return words.sentence(title), words.sentence(f"{named} {how}: {fall}{end}")
@@ -113,17 +111,8 @@ def _noise_left(d: Diagnosis, noise: str) -> str:
 
 def _rest(d: Diagnosis) -> str:
     left = left_channel(d)
-    stays = f"stays at {_near(times_noise(d, left)[1])} times the noise" if left else ""
+    stays = f"stays at {words.times(times_noise(d, left)[1])} times the noise" if left else ""
     return f"the {words.channel(left)} residual {stays}" if left else "the rest stays unexplained"
-
-
-def _near(ratio: float) -> str:
-    """Return a ratio near the floor with two digits behind the point."""
-    return f"{ratio:.2f}" if ratio < 2.0 else f"{ratio:.1f}"
-
-
-def _digits(ratio: float) -> str:
-    return words.number(ratio, 2 if ratio < 100.0 else 3)
 
 
 def cause_list(causes: Sequence[Cause]) -> str:
@@ -200,7 +189,7 @@ def prose(text: str) -> str:
 
 def misfit(m: Misfit) -> str:
     """Return `speed −20 to 0 mrad/s (48 times)`."""
-    return f"{respect(m.what)} {words.span(m.low, m.high, m.unit)} ({_digits(m.times_noise)} times)"
+    return f"{respect(m.what)} {words.span(m.low, m.high, m.unit)} ({words.times(m.times_noise)} times)"
 
 
 def confusions(diagnosis: Diagnosis) -> list[str]:

@@ -65,13 +65,12 @@ def peak_above(frequency: FloatArray, values: FloatArray, noise: float) -> str:
 
 def finding(frequency: FloatArray, values: FloatArray, noise: float, channel: str) -> str:
     """Return the sentence: at the noise floor, or where above it the most."""
-    f, d = in_bands(frequency, values)
-    ratio = d / max(noise, _TINY)
-    worst, above = int(np.argmax(ratio)), f[ratio > _STANDS]
     if not (peak := peak_above(frequency, values, noise)):
         return words.sentence(f"{channel}: the residual lies at the noise floor at all frequencies")
-    if not len(above):
-        return words.sentence(f"{channel}: the residual lies above the noise floor, at most {peak}")
-    band = f"{words.number(above[0], 2)} to {words.number(above[-1], 2)} Hz"
-    most = f"{words.number(f[worst], 2)} Hz ({words.number(ratio[worst], 2)} times)"
-    return words.sentence(f"{channel}: the residual stands above the noise floor from {band}, most at {most}")
+    f, d = in_bands(frequency, values)
+    above = f[d > _STANDS * max(noise, _TINY)]
+    where = "lies above the noise floor"
+    if len(above):
+        band = f"{words.number(above[0], 2)} to {words.number(above[-1], 2)} Hz"
+        where = f"stands above the noise floor from {band}"
+    return words.sentence(f"{channel}: the residual {where}, at most {peak}")

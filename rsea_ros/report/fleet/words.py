@@ -86,7 +86,7 @@ def about(alarm: Alarm) -> str:
     """Return an alarm in a few words, without the date."""
     a = alarm
     if a.kind == "fault":
-        return f"{_plain(a.about)} in the data"
+        return f"{words.sentence(words.fault(a.about))} in the data"
     if a.kind == "cause":
         return f"{cause_name(a)}{f', {value(a.size, a.unit)}' if a.size is not None else ''}"
     if a.kind == "outlier":
@@ -106,7 +106,7 @@ def sentence(alarm: Alarm) -> str:
     if a.kind == "outlier":
         return f"{subject(a.about)} is {_beside(a)} the median of the fleet"
     if a.kind == "fault":
-        return f"{_plain(a.about)} in the data since {start}"
+        return f"{words.sentence(words.fault(a.about))} in the data since {start}"
     if a.kind == "cause":
         return f"{cause_name(a)} {beginning(a)}{size_now(a)}"
     if a.kind == "trend":
@@ -199,10 +199,6 @@ def latest_causes(joints: Sequence[str], recordings: Table) -> Mapping[str, str]
         if sure:
             latest[joint] = list_names(sure)
     return latest
-
-
-def _plain(kind: str) -> str:
-    return "NaN" if kind == "nan" else words.sentence(kind.replace("_", " "))
 
 
 _RESULTS = (REPORT, DIAGNOSIS_JSON, IDENTIFICATION_JSON)

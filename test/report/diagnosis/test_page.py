@@ -70,7 +70,7 @@ def test_every_verdict_makes_a_page(diagnosed, name: str) -> None:
     )
     html = diagnosis_report(d)
     head = html[: html.index('id="plotly"')]
-    assert "Samples were masked: frozen samples in F/T torque; nan in F/T torque." in head
+    assert "Samples were masked: frozen samples in F/T torque; NaN in F/T torque." in head
     assert "ros2 run rsea_ros excite --ros-args -p kind:=steps -p amplitude:=12.5" in head
     assert "&lt;a&gt;" in head and "<a>" not in head
     assert ("do not distinguish it from hard stop or F/T sensor lag" in head) == (name == "partly_explained")
