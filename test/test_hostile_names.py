@@ -27,7 +27,7 @@ from rsea_ros.laws.terms import GEAR_TERMS
 from rsea_ros.model.rig_file import RigChoice, load_rig, rig_text
 from rsea_ros.report.figures.figure import Figure
 from rsea_ros.report.page import Html, code, page
-from rsea_ros.report.rig import command
+from rsea_ros.report.remark_words import command
 
 RIG = load_rig("paper_high_impedance")
 CODE = "__import__('os').system('touch pwned')"

@@ -117,7 +117,7 @@ def _print(result: Diagnosis, report: Path) -> None:
     from rich.console import Console
 
     from rsea_ros.report.diagnosis.words import terminal_lines
-    from rsea_ros.report.rig import command
+    from rsea_ros.report.remark_words import command
     from rsea_ros.report.words import command_row
 
     console, width = Console(), _terminal.width()

@@ -54,8 +54,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _print(result: Identification, report: Path) -> None:
     from rsea_ros.report import identification as words
-    from rsea_ros.report.remark_words import fault_lines, remark_sentences
-    from rsea_ros.report.rig import right_rig, split_off_rig
+    from rsea_ros.report.remark_words import fault_lines, remark_sentences, right_rig, split_off_rig
 
     say(words.verdict_sentence(result))
     if following := words.next_command(result):

@@ -49,7 +49,7 @@ def run(args: argparse.Namespace) -> int:
         _output.print_file(report.parent / LAW_JSON)
     else:
         from rsea_ros.report.law import gain_sentence, headline, law_lines
-        from rsea_ros.report.rig import rig_named
+        from rsea_ros.report.remark_words import rig_named
 
         say(headline(result))
         print(f"rig         {rig_named(result.rig_name, result.rig_choice)}")

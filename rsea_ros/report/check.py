@@ -16,6 +16,7 @@ from rsea_ros.records.record import UNITS, FloatArray, Record
 from rsea_ros.records.stamps import repair_stamps
 from rsea_ros.report import page as html, words
 from rsea_ros.report.figures.figure import BEFORE, MEASURED, QUIET, Figure, axis, label, layout, line
+from rsea_ros.report.remark_words import rig_in_brackets
 from rsea_ros.report.result_files import (
     CHECK_JSON,
     REPORT,
@@ -25,7 +26,6 @@ from rsea_ros.report.result_files import (
     pick,
     strict,
 )
-from rsea_ros.report.rig import rig_in_brackets
 from rsea_ros.report.words import WIDTH, wrap
 
 SCHEMA = 1

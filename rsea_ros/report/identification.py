@@ -11,17 +11,16 @@ from rich.table import Table
 
 from rsea_ros.documents.wording import list_names
 from rsea_ros.identification.identify import explained_by_lost_cycles
-from rsea_ros.identification.result import CLOCKS, Identification, Overlay, ParameterEstimate, Statics
+from rsea_ros.identification.result import CLOCKS, Identification, Overlay, ParameterEstimate, Remark, Statics
 from rsea_ros.model.rig_file import rig_text
 from rsea_ros.outputs.new_files import Destination, NewFiles
 from rsea_ros.records.record import SENSED, UNITS, FloatArray
 from rsea_ros.records.statistics import Z95
-from rsea_ros.report import page as html, result_files as outputs, rig as rigs, words
+from rsea_ros.report import page as html, remark_words as remarks, result_files as outputs, words
 from rsea_ros.report.figures.figure import AFTER, BEFORE, GRID, MEASURED, QUIET, Curve, Figure, faint
 from rsea_ros.report.figures.overlay import overlay_figure
 from rsea_ros.report.figures.response import bode_figure
 from rsea_ros.report.figures.spectrum import density, finding, residual_figure
-from rsea_ros.report.remark_words import coloured_noise, fault_lines, remark_sentences
 
 STRONG = 0.9
 """Correlation from which two values are hardly distinguishable."""
@@ -49,9 +48,9 @@ def identification_report(
 ) -> str:
     """Return the report as HTML that opens offline."""
     i = identification
-    kicker = f"Identification of {rigs.rig_named(i.rig.name, i.rig_choice)} · "
-    damage = [words.sentence(f"{line}.") for line in fault_lines(i.faults)]
-    notes = [*i.notes, *remark_sentences(i.clocks), "rsea identify. All values in SI."]
+    kicker = f"Identification of {remarks.rig_named(i.rig.name, i.rig_choice)} · "
+    damage = [words.sentence(f"{line}.") for line in remarks.fault_lines(i.faults)]
+    notes = [*i.notes, *remarks.remark_sentences(i.clocks), "rsea identify. All values in SI."]
     footer = [f"Data: {', '.join(i.sources)}", *damage, *notes]
     about = i.rig.about or i.rig.name.replace("_", " ")
     return html.page(verdict_sentence(i), kicker + about, _blocks(i), footer, provenance)
@@ -68,7 +67,7 @@ def _blocks(i: Identification) -> Iterator[html.Block]:
         ])  # fmt: skip
     if following := next_command(i):
         yield html.Html(f'<p class="next">To find the cause and its gain: {html.code(following)}</p>')
-    yield rigs.right_rig_block(i.remarks)
+    yield remarks.right_rig_block(i.remarks)
     yield _parameters(i.parameters)
     if i.statics is not None:
         yield html.section("Slow ramps against the locked output", html.bullets(statics_sentences(i.statics)))
@@ -81,16 +80,16 @@ def _blocks(i: Identification) -> Iterator[html.Block]:
         title = words.sentence(f"{words.channel(n)} over time: {left}")
         yield overlay_figure(title, n, o.t, o.measured, [Curve("simulated", AFTER, o.simulated)])
         yield _over_frequency(i, overlay)
-    unclear = (*doubt_sentences(i), *remark_sentences(rigs.split_off_rig(i.remarks)[1]))
-    yield undetermined_section(unclear)
+    yield undetermined_section(doubt_sentences(i), i.remarks)
     physical = [k for k, p in enumerate(i.parameters) if not p.name.startswith("clock.")]
     names = [i.parameters[k].name for k in physical]
     yield correlation_section(names, i.correlation[np.ix_(physical, physical)])
 
 
-def undetermined_section(sentences: Sequence[str]) -> html.Html:
-    """Return what data cannot determine, a sentence each."""
-    body = html.bullets(sentences) if sentences else "The data determine every free value."
+def undetermined_section(sentences: Sequence[str], said: Sequence[Remark]) -> html.Html:
+    """Return what data cannot determine: sentences, and remarks that are not about the rig."""
+    every = [*sentences, *remarks.remark_sentences(remarks.split_off_rig(said)[1])]
+    body = html.bullets(every) if every else "The data determine every free value."
     return html.section("What these data cannot determine", body)
 
 
@@ -220,13 +219,13 @@ def verdict_sentence(identification: Identification) -> str:
     """
     averaged = [words.channel(f.channel) for f in identification.faults if f.kind == "smoothing"]
     biased = f"{list_names(averaged)} averaged before logging, which biases values beyond their intervals"
-    parts = (_verdict(identification), rigs.values_off(identification.remarks), biased if averaged else "")
+    parts = (_verdict(identification), remarks.values_off(identification.remarks), biased if averaged else "")
     return "; ".join(filter(None, parts))
 
 
 def _verdict(identification: Identification) -> str:
     ratios = identification.times_noise
-    rig = rigs.rig_in_brackets(identification.rig.name, identification.rig_choice)
+    rig = remarks.rig_in_brackets(identification.rig.name, identification.rig_choice)
     if not ratios:
         return f"No channel to test the model with ({rig})"
     worst = max(ratios, key=lambda n: ratios[n])
@@ -248,12 +247,12 @@ def next_command(identification: Identification) -> str:
     i = identification
     if i.at_noise or explained_by_lost_cycles(i):
         return ""
-    return rigs.command("diagnose", i.sources, i.rig.name, i.rig_choice)
+    return remarks.command("diagnose", i.sources, i.rig.name, i.rig_choice)
 
 
 def doubt_sentences(identification: Identification) -> tuple[str, ...]:
     """Return the conditions of the intervals, if they cover more or less than noise."""
-    sentences = [coloured_noise(identification.coloured)] if identification.coloured else []
+    sentences = [remarks.coloured_noise(identification.coloured)] if identification.coloured else []
     if explained_by_lost_cycles(identification):
         sentences.append(_LOST)
     elif not identification.at_noise and identification.alternatives:
@@ -330,7 +329,7 @@ def identification_json(identification: Identification) -> dict[str, Any]:
     return {
         "schema": SCHEMA,
         "rig": i.rig.name,
-        **rigs.rig_json(i.rig_choice, i.remarks),
+        **remarks.rig_json(i.rig_choice, i.remarks),
         "verdict": i.verdict,
         "sentence": verdict_sentence(i),
         "next": next_command(i) or None,
@@ -346,8 +345,8 @@ def identification_json(identification: Identification) -> dict[str, Any]:
         ],
         **(outputs.pick(i, "statics") if i.statics else {}),
         "alternatives": list(i.alternatives),
-        "statements": [*doubt_sentences(i), *remark_sentences(i.remarks)],
-        "notes": [*i.notes, *remark_sentences(i.clocks)],
+        "statements": [*doubt_sentences(i), *remarks.remark_sentences(i.remarks)],
+        "notes": [*i.notes, *remarks.remark_sentences(i.clocks)],
     }  # fmt: skip
 
 

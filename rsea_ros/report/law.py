@@ -16,8 +16,8 @@ from rsea_ros.records.statistics import Z95
 from rsea_ros.report import page as html, words
 from rsea_ros.report.figures import figure as fig
 from rsea_ros.report.figures.figure import AFTER, QUIET, faint
+from rsea_ros.report.remark_words import command
 from rsea_ros.report.result_files import BASE, LAW_JSON, MODEL, REPORT, Provenance, json_text, pick
-from rsea_ros.report.rig import command
 
 _MOST_TRIED = 12
 _PARITY = {"odd": "turns with the command's sign", "even": "keeps its sign when the command turns",

@@ -15,7 +15,7 @@ from msg_adapters import TopicMap, write_record
 from rsea_ros.cli import diagnose, identify
 from rsea_ros.cli._topics import rig_choice, topic_map
 from rsea_ros.cli.main import attach_axis, main
-from rsea_ros.report.rig import command
+from rsea_ros.report.remark_words import command
 
 OPTIONS = [
     ["--axis=-torque.x", "--window", "5:20"],

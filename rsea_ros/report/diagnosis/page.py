@@ -13,14 +13,12 @@ from rsea_ros.identification.settings import Setting
 from rsea_ros.model.rig_file import rig_text
 from rsea_ros.outputs.new_files import Destination, NewFiles
 from rsea_ros.records.record import UNITS, Channel, Record
-from rsea_ros.report import page as html, result_files as outputs, words
+from rsea_ros.report import page as html, remark_words as remarks, result_files as outputs, words
 from rsea_ros.report.diagnosis import words as say
 from rsea_ros.report.diagnosis.figures import profiles, sketch, spectrum_figure, time_figure, where_figure
 from rsea_ros.report.figures.figure import AFTER, BEFORE, GRID, MEASURED, faint
 from rsea_ros.report.identification import parameter_table, parameters_json, undetermined_section
-from rsea_ros.report.remark_words import fault_lines, found_faults, remark_sentences
 from rsea_ros.report.result_files import Provenance, pick
-from rsea_ros.report.rig import command, rig_json, rig_named, right_rig_block, split_off_rig
 
 _EXCITE = ("kind", "amplitude", "noise", "low", "high", "period", "duration", "rate", "seed")
 """Settings that are parameters of the node excite."""
@@ -31,7 +29,7 @@ def diagnosis_report(diagnosis: Diagnosis, provenance: Provenance | None = None)
     """Return the report as HTML that opens offline."""
     d = diagnosis
     footer = [f"Data: {', '.join(d.sources)}", "rsea diagnose. All values in SI."]
-    rig = rig_named(d.rig_name, d.rig_choice)
+    rig = remarks.rig_named(d.rig_name, d.rig_choice)
     kicker = f"Diagnosis of {rig} · {d.duration:.0f} s of data at {d.rate:.0f} Hz"
     return html.page(say.headline(d), kicker, _blocks(d), footer, provenance)
 
@@ -39,8 +37,8 @@ def diagnosis_report(diagnosis: Diagnosis, provenance: Provenance | None = None)
 def _blocks(d: Diagnosis) -> Iterator[html.Block]:
     main = d.channel
     yield html.key_numbers(_keys(d, words.channel(main)))
-    yield right_rig_block(d.remarks, command("identify", d.sources, d.rig_name, d.rig_choice))
-    yield html.paragraph(found_faults(d.faults).strip(), "next")
+    yield remarks.right_rig_block(d.remarks, remarks.command("identify", d.sources, d.rig_name, d.rig_choice))
+    yield html.paragraph(remarks.found_faults(d.faults).strip(), "next")
     yield sketch([c.name for c in d.causes])
     yield from (spectrum_figure(d, s) for s in d.spectra if s.channel == main)
     if any(o.channel == main for o in d.before):
@@ -54,7 +52,7 @@ def _blocks(d: Diagnosis) -> Iterator[html.Block]:
     yield html.section(f"Values of the rig{together}", parameter_table(d.final))
     yield _tried(d)
     yield _channels(d)
-    yield undetermined_section([*say.confusions(d), *remark_sentences(split_off_rig(d.remarks)[1])])
+    yield undetermined_section(say.confusions(d), d.remarks)
     if d.next_experiment is not None:
         yield _experiment(d.next_experiment)
     yield _faults(d)
@@ -156,7 +154,7 @@ def _experiment(experiment: Experiment) -> html.Html:
 def _faults(d: Diagnosis) -> html.Html:
     if not d.faults:
         return html.section("No fault was found in the data", "No sample is missing, frozen or clipped.")
-    items = html.bullets([words.sentence(f"{line}.") for line in fault_lines(d.faults)])
+    items = html.bullets([words.sentence(f"{line}.") for line in remarks.fault_lines(d.faults)])
     caption = "These faults were found before any fit. Faulty samples are masked, never explained by physics."
     return html.section("Faults of the data", items, caption=caption)
 
@@ -235,7 +233,7 @@ def diagnosis_json(diagnosis: Diagnosis) -> dict[str, Any]:
     return {
         "schema": SCHEMA,
         "rig": d.rig_name,
-        **rig_json(d.rig_choice, d.remarks),
+        **remarks.rig_json(d.rig_choice, d.remarks),
         **pick(d, "verdict channel"),
         "sentence": say.diagnosis_sentence(d),
         "data": {**pick(d, "bags=sources duration_s=duration rate_hz=rate"),
@@ -265,7 +263,7 @@ def diagnosis_json(diagnosis: Diagnosis) -> dict[str, Any]:
         "why_stopped": d.why_stopped,
         "edit": d.edit and {**vars(d.edit), "survived": d.edit.survived},
         "next_experiment": following and {"why": say.next_run(following), **pick(following, "excitation")},
-        "statements": list(remark_sentences(d.remarks)),
+        "statements": list(remarks.remark_sentences(d.remarks)),
         "settings": {**pick(d.settings, "max_causes without"), **numbers},
         "noise_numbers": {name: v for name, v in numbers.items() if name.startswith("noise.")},
     }  # fmt: skip

@@ -24,10 +24,8 @@ from rsea_ros.effects.catalogue import catalogue, effect_named
 from rsea_ros.identification.result import is_unexcited, silent_channels
 from rsea_ros.records.record import UNITS
 from rsea_ros.records.statistics import Z95
-from rsea_ros.report import words
+from rsea_ros.report import remark_words as remarks, words
 from rsea_ros.report.figures.spectrum import peak_above
-from rsea_ros.report.remark_words import fault_lines, found_faults, remark_sentences
-from rsea_ros.report.rig import command, rig_named, right_rig, split_off_rig, values_off
 from rsea_ros.report.words import LABEL, WIDTH, command_row, row, wrap
 
 _REASONS: Mapping[Reason, str] = {
@@ -56,13 +54,13 @@ _BY_THE_WAY = ("rate", "seed", "period")
 
 def headline(diagnosis: Diagnosis) -> str:
     """Return the verdict as one short sentence, and how many values are not the rig's."""
-    return "; ".join(filter(None, (_verdict(diagnosis)[0], values_off(diagnosis.remarks))))
+    return "; ".join(filter(None, (_verdict(diagnosis)[0], remarks.values_off(diagnosis.remarks))))
 
 
 def diagnosis_sentence(diagnosis: Diagnosis) -> str:
     """Return the verdict with its numbers, values that are not the rig's, and faults of the data."""
-    off = words.sentence(values_off(diagnosis.remarks))
-    return f"{_verdict(diagnosis)[1]}.{f' {off}.' if off else ''}{found_faults(diagnosis.faults)}"
+    off = words.sentence(remarks.values_off(diagnosis.remarks))
+    return f"{_verdict(diagnosis)[1]}.{f' {off}.' if off else ''}{remarks.found_faults(diagnosis.faults)}"
 
 
 def _verdict(d: Diagnosis) -> tuple[str, str]:
@@ -74,7 +72,8 @@ def _verdict(d: Diagnosis) -> tuple[str, str]:
         text = "These data show nothing: the command never changes, so no cause could be seen"
         return text, text
     if d.verdict == "nothing_wrong":
-        fine = "The structure of the {} fits" if values_off(d.remarks) else "Nothing is wrong with the {}"
+        is_off = remarks.values_off(d.remarks)
+        fine = "The structure of the {} fits" if is_off else "Nothing is wrong with the {}"
         title = f"{fine.format('simulation')}: with fitted values, {_noise_left(d, 'only sensor noise')}"
         return title, f"{fine.format('model')}: with its values {at_floor}"
     if d.verdict == "unexplained" and silent and d.at_noise_floor:
@@ -330,14 +329,14 @@ def fitted_rivals(diagnosis: Diagnosis) -> list[Rejected]:
 
 def terminal_lines(diagnosis: Diagnosis, width: int = WIDTH) -> list[Text]:
     """Return the verdict and the evidence, each in lines of at most `width` columns."""
-    d, (off, others) = diagnosis, split_off_rig(diagnosis.remarks)
+    d, (off, others) = diagnosis, remarks.split_off_rig(diagnosis.remarks)
     style = _STYLES.get(d.verdict, "bold yellow" if off else "bold green")
-    rows = [row("rig", rig_named(d.rig_name, d.rig_choice), width)]
-    rows += [row("", sentence, width) for sentence in remark_sentences(off)]
+    rows = [row("rig", remarks.rig_named(d.rig_name, d.rig_choice), width)]
+    rows += [row("", sentence, width) for sentence in remarks.remark_sentences(off)]
     if off:  # what speaks against the rig
-        again = command("identify", d.sources, d.rig_name, d.rig_choice)
-        rows.append(command_row("", right_rig(), again, width))
-    rows += [row(name, text, width) for name, text in _rows(d, remark_sentences(others))]
+        again = remarks.command("identify", d.sources, d.rig_name, d.rig_choice)
+        rows.append(command_row("", remarks.right_rig(), again, width))
+    rows += [row(name, text, width) for name, text in _rows(d, remarks.remark_sentences(others))]
     shown = (Text.assemble((text[:LABEL], "dim"), text[LABEL:]) for text in rows)
     return [Text(wrap(headline(d), width), style=style), *shown]
 
@@ -360,7 +359,7 @@ def edit_sentence(e: Edit) -> str:
     )
 
 
-def _rows(d: Diagnosis, remarks: Sequence[str]) -> Iterator[tuple[str, str]]:
+def _rows(d: Diagnosis, unclear: Sequence[str]) -> Iterator[tuple[str, str]]:
     main = d.channel
     ratios, rms = residual_change(d, main), rms_change(d, main)
     yield "residual", f"{words.channel(main)} {ratios} times the noise ({rms})"
@@ -384,11 +383,11 @@ def _rows(d: Diagnosis, remarks: Sequence[str]) -> Iterator[tuple[str, str]]:
         yield "rejected", f"{rival.name}: {prose(rejection(rival))}"
     if d.rejected:
         yield "tried", tried(d)
-    for sentence in (*confusions(d), *remarks):
+    for sentence in (*confusions(d), *unclear):
         yield "unclear", sentence
     if (following := d.next_experiment) is not None:
         settings = excitation(following.excitation)
         run = f"{prose(next_run(following))}{f': {settings}' if settings else ''}"
         yield "next run" if following.excitation else "decides", run
-    for line in fault_lines(d.faults):
+    for line in remarks.fault_lines(d.faults):
         yield "data", line
