@@ -76,9 +76,10 @@ def _blocks(i: Identification) -> Iterator[html.Block]:
     by_name = {o.channel: o for o in i.overlays}  # the motor torque only repeats the command
     for overlay in [by_name[n] for n in SENSED if n in by_name] or i.overlays:
         n, o = overlay.channel, overlay
+        named = words.channel(n), words.unit(UNITS[n])
         left = f"{i.fit_percent[n]:.2f} % explained, {words.quantity(i.residual_rms[n], UNITS[n])} RMS left"
         title = words.sentence(f"{words.channel(n)} over time: {left}")
-        yield overlay_figure(title, n, o.t, o.measured, [Curve("simulated", AFTER, o.simulated)])
+        yield overlay_figure(title, *named, o.t, o.measured, [Curve("simulated", AFTER, o.simulated)])
         yield _over_frequency(i, overlay)
     yield undetermined_section(doubt_sentences(i), i.remarks)
     physical = [k for k, p in enumerate(i.parameters) if not p.name.startswith("clock.")]

@@ -16,6 +16,7 @@ from rsea_ros.records.statistics import Z95
 from rsea_ros.report import page as html, words
 from rsea_ros.report.figures import figure as fig
 from rsea_ros.report.figures.figure import AFTER, QUIET, faint
+from rsea_ros.report.figures.overlay import overlay_figure
 from rsea_ros.report.remark_words import command
 from rsea_ros.report.result_files import BASE, LAW_JSON, MODEL, REPORT, Provenance, json_text, pick
 
@@ -48,7 +49,9 @@ def _blocks(result: LawResult) -> Iterator[html.Block]:
     for written in result.laws:
         yield _law(written)
         yield over_figure(written)
-        yield time_figure(written)
+        s, curves = written.shown, [fig.Curve("law", AFTER, written.shown.law)]
+        missing = ("missing angle", "rad") if written.law.place == "encoder" else ("missing torque", "N·m")
+        yield overlay_figure("The same over time", *missing, s.t, s.values, curves)
     if result.dependences:
         yield _dependences(result)
     yield _gain(result)
@@ -178,21 +181,6 @@ def _in_bins(x: FloatArray, y: FloatArray, law: FloatArray) -> FloatArray:
         rows.append((0.5 * (edges[k] + edges[k + 1]), *np.quantile(law[which == k], (0.1, 0.9)), *mean))
     shown: FloatArray = np.array(rows).T
     return shown
-
-
-def time_figure(written: WrittenLaw) -> fig.Figure:
-    """Return the missing torque and the law over time."""
-    shown, unit = written.shown, words.unit("rad" if written.law.place == "encoder" else "N m")
-    hover = {"hovertemplate": f"%{{y:.3g}} {unit}"}
-    data = [
-        fig.line(shown.t, shown.values, "missing", fig.MEASURED, 1.0, **hover),
-        fig.line(shown.t, shown.law, "law", fig.AFTER, 1.4, **hover),
-    ]
-    names = fig.names_beside(fig.named(data), 0.13)
-    middle = float(shown.t[len(shown.t) // 2])
-    across = fig.axis("time, s", range=[middle, min(middle + 3.0, float(shown.t[-1]))])
-    plane = fig.layout(xaxis=across, yaxis=fig.axis(unit), annotations=names)
-    return fig.Figure("The same over time", "Drag to look closer, double click to see all.", data, plane, 300)
 
 
 SCHEMA = 1

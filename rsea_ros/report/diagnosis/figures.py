@@ -56,15 +56,16 @@ def time_figure(diagnosis: Diagnosis, channel: str) -> Figure:
     """
     d = diagnosis
     before, after = (next(o for o in of if o.channel == channel) for of in (d.before, d.after))
-    name, fit = words.sentence(words.channel(channel)), f"{d.fit_percent[channel]:.2f} %"
+    named = words.channel(channel), words.unit(UNITS[channel])
+    name, fit = words.sentence(named[0]), f"{d.fit_percent[channel]:.2f} %"
     if not d.causes:
         simulated = Curve("simulated", AFTER if d.at_noise_floor else BEFORE, before.simulated)
         title = f"{name} over time: {fit} explained"
-        return overlay_figure(title, channel, before.t, before.measured, [simulated])
+        return overlay_figure(title, *named, before.t, before.measured, [simulated])
     title = f"{name} over time: {fit} → {d.extended_fit_percent[channel]:.2f} % explained"
     both = [Curve("before", BEFORE, before.simulated), Curve("after", AFTER, after.simulated)]
     apart = before.simulated - after.simulated
-    return overlay_figure(title, channel, before.t, before.measured, both, _FIRST_VIEW, apart)
+    return overlay_figure(title, *named, before.t, before.measured, both, _FIRST_VIEW, apart)
 
 
 _PARTS = ("command", "motor", "gear", "encoder", "spring", "F/T sensor", "support")

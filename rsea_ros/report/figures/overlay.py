@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rsea_ros.records.record import UNITS, FloatArray
-from rsea_ros.report import words
+from rsea_ros.records.record import FloatArray
 from rsea_ros.report.figures import figure as fig
 
 MOST_SAMPLES = 45_000
@@ -25,15 +24,14 @@ _PAUSE, _PERIODS = 1.0, 10.0
 
 
 def overlay_figure(
-    title: str, channel: str, t: FloatArray, measured: FloatArray, simulations: Sequence[fig.Curve],
+    title: str, what: str, unit: str, t: FloatArray, measured: FloatArray, simulations: Sequence[fig.Curve],
     view: float = 6.0, lively: FloatArray | None = None,
 ) -> fig.Figure:  # fmt: skip
-    """Return the figure of one channel. t: stamps of the measured and the simulated values, s.
+    """Return the figure of one channel, or of something else. t: stamps of its values, s.
 
     It opens with the `view` s in which a signal moves most. lively: that signal, by default the measured one.
     """
     keep = sample_extremes(measured, measured - simulations[-1].values)
-    unit = words.unit(UNITS[channel])
     pauses = pauses_of(t[keep])
     shown = measured[keep]
     shown[list(pauses)] = np.nan
@@ -52,7 +50,7 @@ def overlay_figure(
     }
     caption = "Drag to zoom, double-click to see the whole record; every zoom draws all samples."
     opening = _liveliest(t - t[0], measured if lively is None else lively, view)
-    drawn = _layout(channel, unit, simulations, opening)
+    drawn = _layout(f"{what}, {unit}", unit, simulations, opening)
     return fig.Figure(title, caption, [], drawn, 460, "overlay", extra)
 
 
@@ -99,7 +97,7 @@ def _liveliest(t: FloatArray, signal: FloatArray, view: float) -> tuple[float, f
     return start, start + view
 
 
-def _layout(channel: str, unit: str, simulations: Sequence[fig.Curve], view: tuple[float, float]) -> fig.Json:
+def _layout(what: str, unit: str, simulations: Sequence[fig.Curve], view: tuple[float, float]) -> fig.Json:
     names = fig.names_beside(
         [("measured", fig.MEASURED), *((f"<b>{s.name}</b>", s.colour) for s in simulations)], 0.055, 1.01
     )
@@ -108,7 +106,7 @@ def _layout(channel: str, unit: str, simulations: Sequence[fig.Curve], view: tup
     title, zero = {"text": "%{x} s"}, fig.faint(fig.MEASURED, 0.4)
     return fig.layout(
         xaxis=fig.axis("time, s", anchor="y2", range=list(view), hoverformat=".3f", unifiedhovertitle=title),
-        yaxis=fig.axis(f"{words.channel(channel)}, {unit}", domain=[0.3, 1.0]),
+        yaxis=fig.axis(what, domain=[0.3, 1.0]),
         yaxis2=fig.axis(f"residual, {unit}", domain=[0.0, 0.22], zeroline=True, zerolinecolor=zero),
         annotations=names,
         hoversubplots="axis",

@@ -57,7 +57,9 @@ def test_a_pause_of_the_samples_is_not_drawn_and_keeps_its_length() -> None:
     assert (at, seconds) == (300, pytest.approx(60.0 - 299.0 / 280.0))
     joined = np.diff(without({at: seconds}, t))[298:301]
     np.testing.assert_allclose(joined, [1.0 / 280.0, 0.0, 1.0 / 280.0], atol=1e-12)
-    figure = overlay_figure("Paused", "ft", t, np.sin(t), [Curve("simulated", BEFORE, 0.9 * np.sin(t))])
+    figure = overlay_figure(
+        "Paused", "F/T torque", "N·m", t, np.sin(t), [Curve("simulated", BEFORE, 0.9 * np.sin(t))]
+    )
     assert figure.extra["pauses"] == [(at, seconds)]
     assert figure.extra["t"]["step"] < 2e-6
 
