@@ -27,8 +27,6 @@ TRUTH = "#2b8a3e"
 FONT = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', Arial, sans-serif"
 KEY: Json = {"thickness": 9, "outlinewidth": 0}
 """The bar that names colours."""
-_DIGITS, _MOST_DIGITS = 5, 15
-"""Significant digits of a number, at least and at most: a double has 15."""
 
 
 def faint(colour: str, opacity: float) -> str:
@@ -58,18 +56,10 @@ class Curve(NamedTuple):
     values: FloatArray
 
 
-def numbers(values: FloatArray, step: float = 0.0) -> list[float | None]:
-    """Return values for JSON: at least five significant digits, None where not finite.
-
-    step: resolution to keep, in the unit of the values, where they are close to each other; 0 for none.
-    """
-    decimals = math.ceil(-math.log10(step)) if step > 0.0 else 0
-    return [_short(float(v), decimals) if np.isfinite(v) else None for v in np.asarray(values, dtype=float)]
-
-
-def _short(value: float, decimals: int) -> float:
-    before = math.floor(math.log10(abs(value))) + 1 if value else 0
-    return float(f"{value:.{max(_DIGITS, min(before + decimals, _MOST_DIGITS))}g}")
+def numbers(values: FloatArray) -> list[float | None]:
+    """Return values for JSON: eight significant digits, which resolve values close to each other; None where
+    not finite."""
+    return [float(f"{v:.8g}") if np.isfinite(v) else None for v in np.asarray(values, dtype=float)]
 
 
 def layout(**parts: Any) -> Json:

@@ -17,8 +17,6 @@ _FEW = 14
 """Days up to which each has its name: plotly would name their hours."""
 _BAR = 0.9 * 86_400_000.0
 """Width of a bar, ms for each day of its step: plotly draws a single bar without one as a hairline."""
-_FINE = 0.02
-"""Share of the course's interval to which values are drawn."""
 _AHEAD = 0.5
 """Share of the time covered up to which a trend is drawn on."""
 _MARGIN = {"l": 64, "r": 24, "t": 12, "b": 40}
@@ -120,7 +118,6 @@ def parameter_figure(trend: Trend, steps: Steps) -> fig.Figure:
     """Return the figure of a parameter that the recordings determine: course, changes, forecast."""
     factor, unit = words.unit_factor(trend.now.value if trend.now else 1.0, trend.series.unit)
     assert trend.curve is not None
-    fine = _FINE * float(np.median(trend.curve.high - trend.curve.low)) * abs(factor)
     ahead, until = _ahead(trend, steps, factor)
     bins, dated = bin_days(trend, steps), [c for c in trend.changes if not c.open_start]
     shapes, labels = [m for c in dated for m in _change_marks(c)], [_label(c, trend) for c in dated]
@@ -134,7 +131,7 @@ def parameter_figure(trend: Trend, steps: Steps) -> fig.Figure:
     return fig.Figure(
         say.finding(trend),
         _caption(trend),
-        [*_course(trend, factor, fine), *ahead, *_weeks(bins, trend, steps, factor, unit, fine)],
+        [*_course(trend, factor), *ahead, *_weeks(bins, trend, steps, factor, unit)],
         fig.layout(
             xaxis=date_axis(steps, until),
             yaxis=fig.axis(f"{say.name(trend.series.parameter)}, {unit}".rstrip(", "), hoverformat=".4g"),
@@ -147,8 +144,8 @@ def parameter_figure(trend: Trend, steps: Steps) -> fig.Figure:
     )
 
 
-def _weeks(bins: Binned, trend: Trend, steps: Steps, factor: float, unit: str, fine: float) -> list[fig.Json]:
-    """Return the mean of each step, and marks below those that could not determine it. fine: resolution."""
+def _weeks(bins: Binned, trend: Trend, steps: Steps, factor: float, unit: str) -> list[fig.Json]:
+    """Return the mean of each step, and marks below those that could not determine it."""
     some, none = np.isfinite(bins.value), (bins.recorded > 0) & (bins.identifiable == 0)
     time_s = trend.series.time_s
     places = say.dates(*np.clip(steps.middle, time_s[0], time_s[-1])[some])
@@ -159,7 +156,7 @@ def _weeks(bins: Binned, trend: Trend, steps: Steps, factor: float, unit: str, f
     bottom = say.dates(*steps.middle[none])
     return [
         fig.points(
-            places, fig.numbers(bins.value[some] * factor, fine), steps.name,
+            places, fig.numbers(bins.value[some] * factor), steps.name,
             marker={"color": fig.MEASURED, "size": 5}, error_y=sides,
             customdata=np.column_stack([bins.identifiable[some], bins.recorded[some]]).astype(int).tolist(),
             hovertemplate=f"%{{y:.7g}} {unit}, %{{customdata[0]}} of %{{customdata[1]}} recordings",
@@ -173,12 +170,12 @@ def _fan(x: list[str], y: list[float | None], colour: str) -> fig.Json:
             "fillcolor": colour, "hoverinfo": "skip"}  # fmt: skip
 
 
-def _course(trend: Trend, factor: float, fine: float) -> list[fig.Json]:
+def _course(trend: Trend, factor: float) -> list[fig.Json]:
     assert trend.curve is not None
     c, x = trend.curve, say.dates(*trend.curve.time_s)
-    sides = fig.numbers(np.concatenate([c.high, c.low[::-1]]) * factor, fine)
+    sides = fig.numbers(np.concatenate([c.high, c.low[::-1]]) * factor)
     look: fig.Json = {"mode": "lines", "hoverinfo": "skip", "line": {"color": fig.AFTER, "width": 2}}
-    middle = fig.points(x, fig.numbers(c.value * factor, fine), "trend", **look)
+    middle = fig.points(x, fig.numbers(c.value * factor), "trend", **look)
     return [_fan([*x, *x[::-1]], sides, fig.faint(fig.AFTER, 0.16)), middle]
 
 
