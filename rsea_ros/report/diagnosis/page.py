@@ -13,6 +13,7 @@ from rsea_ros.identification.settings import Setting
 from rsea_ros.model.rig_file import rig_text
 from rsea_ros.outputs.new_files import Destination, NewFiles
 from rsea_ros.records.record import UNITS, Channel, Record
+from rsea_ros.records.statistics import Z95
 from rsea_ros.report import page as html, remark_words as remarks, result_files as outputs, words
 from rsea_ros.report.diagnosis import words as say
 from rsea_ros.report.diagnosis.figures import profiles, sketch, spectrum_figure, time_figure, where_figure
@@ -64,7 +65,8 @@ def _blocks(d: Diagnosis) -> Iterator[html.Block]:
 def _keys(d: Diagnosis, channel: str) -> list[tuple[str, str]]:
     change = say.residual_change(d, d.channel)
     if d.causes:
-        gain = say.gain(d, d.channel)
+        before, after = (rms[d.channel] for rms in (d.residual_rms, d.extended_residual_rms))
+        gain = 1.0 - after / before if before > 0.0 else 0.0
         what = "of the {} residual removed" if gain >= 0.0 else "more {} residual than before"
         key = (say.percent(abs(gain)), f"{what.format(channel)}, on held-out data")
         return [key, (change, "times the noise, before and after")]
@@ -76,22 +78,20 @@ def _keys(d: Diagnosis, channel: str) -> list[tuple[str, str]]:
 def _cause(cause: Cause, d: Diagnosis) -> html.Html:
     """Return a cause with its size, its certainty, and the evidence for it."""
     share = f"{say.percent(cause.gain_holdout)} of the {words.channel(cause.channel)} residual"
-    how_sure = status = say.status_line(cause, d.alternatives, d.at_noise_floor)
-    how_sure = words.sentence(f"{say.prose(status)}.")
+    how_sure = words.sentence(say.prose(say.status_line(cause, d.alternatives, d.at_noise_floor)))
     interval, train = say.percent_range(cause.gain_holdout_ci95), say.percent(cause.gain_train)
-    rivals = list_names([words.effect(n) for n in cause.confusable_with])
     sizes = []
     for name, p in say.sizes(cause).items():
         value, doubt, unit = words.measured(p.value, *p.ci95, p.unit)
         small = f" <small>{doubt.strip()}</small>" if doubt else ""
-        model = f", of which the simulation ± {say.model_half_width(p)}" if p.model_sd > 0.0 else ""
+        side = words.number(Z95 * p.model_sd * words.unit_factor(p.value, p.unit)[0], 2)
+        model = f", of which the simulation ± {side} {unit}".rstrip() if p.model_sd > 0.0 else ""
         label = f"{name.replace('_', ' ')}, 95 % interval{model}"
         sizes.append((html.Html(f"{value}{small} {escape(unit)}"), label))
     return html.section(
-        words.sentence(f"{words.effect(cause.name)}: {share}"), html.key_numbers(sizes), how_sure,
+        words.sentence(f"{words.effect(cause.name)}: {share}"), html.key_numbers(sizes), f"{how_sure}.",
         html.equation(cause.equation) if cause.equation else "", say.evidence(cause),
         f"95 % interval of that gain: {interval}; on the training data it is {train}.",
-        f"These data do not distinguish it from {rivals}." if rivals else "",
         f"Look at: {look}." if (look := say.inspection(cause.name)) else "",
     )  # fmt: skip
 

@@ -23,7 +23,6 @@ from rsea_ros.documents.wording import list_names
 from rsea_ros.effects.catalogue import catalogue, effect_named
 from rsea_ros.identification.result import is_unexcited, silent_channels
 from rsea_ros.records.record import UNITS
-from rsea_ros.records.statistics import Z95
 from rsea_ros.report import remark_words as remarks, words
 from rsea_ros.report.figures.spectrum import peak_above
 from rsea_ros.report.words import LABEL, WIDTH, command_row, row, wrap
@@ -186,11 +185,6 @@ def prose(text: str) -> str:
     return re.sub(r"[a-z]+(?:_[a-z]+)+", lambda match: words.effect(match[0]), text)
 
 
-def misfit(m: Misfit) -> str:
-    """Return `speed −20 to 0 mrad/s (48 times)`."""
-    return f"{respect(m.what)} {words.span(m.low, m.high, m.unit)} ({words.times(m.times_noise)} times)"
-
-
 def confusions(diagnosis: Diagnosis) -> list[str]:
     """Return a sentence for each cause that these data do not distinguish from others."""
     return [
@@ -258,12 +252,6 @@ def left_channel(diagnosis: Diagnosis) -> str:
     return worst if after[worst] > reached else ""
 
 
-def gain(diagnosis: Diagnosis, channel: str) -> float:
-    """Return the gain of all causes together: 1 - RMS(residual after) / RMS(residual before), held out."""
-    before = diagnosis.residual_rms[channel]
-    return 1.0 - diagnosis.extended_residual_rms[channel] / before if before > 0.0 else 0.0
-
-
 def percent(share: float) -> str:
     """Return a share as `97.3 %`, with a minus sign that is one; below −100 % as `< −100 %`."""
     return f"{_percents(share)} %" if np.isfinite(share) else "–"
@@ -286,15 +274,6 @@ def residual_change(diagnosis: Diagnosis, channel: str) -> str:
     return f"{before} → {after}" if diagnosis.causes else before
 
 
-def rms_change(diagnosis: Diagnosis, channel: str) -> str:
-    """Return the same as RMS in the channel's unit beside the noise."""
-    before, after, noise = (
-        words.quantity(v[channel], in_motion(UNITS[channel], linear=diagnosis.baseline_rig.linear))
-        for v in (diagnosis.residual_rms, diagnosis.extended_residual_rms, diagnosis.noise_rms)
-    )
-    return f"{before} → {after}, noise {noise}" if diagnosis.causes else f"{before}, noise {noise}"
-
-
 def sizes(cause: Cause) -> dict[str, CauseParameter]:
     """Return the parameters that say how large a cause is.
 
@@ -303,12 +282,6 @@ def sizes(cause: Cause) -> dict[str, CauseParameter]:
     effect = catalogue().get(cause.name)
     ends = {p.name: p.high for p in effect.parameters if p.optional and math.isinf(p.null)} if effect else {}
     return {n: p for n, p in cause.parameters.items() if p.value < _END * ends.get(n, math.inf)}
-
-
-def model_half_width(estimate: CauseParameter) -> str:
-    """Return the half-width of the simulation's own error at 95 % with its unit: `0.0147 N·m`."""
-    factor, unit = words.unit_factor(estimate.value, estimate.unit)
-    return f"{words.number(Z95 * estimate.model_sd * factor, 2)} {unit}".rstrip()
 
 
 _STYLES = {"partly_explained": "bold yellow", "unexplained": "bold red"}
@@ -361,8 +334,11 @@ def edit_sentence(e: Edit) -> str:
 
 def _rows(d: Diagnosis, unclear: Sequence[str]) -> Iterator[tuple[str, str]]:
     main = d.channel
-    ratios, rms = residual_change(d, main), rms_change(d, main)
-    yield "residual", f"{words.channel(main)} {ratios} times the noise ({rms})"
+    unit = in_motion(UNITS[main], linear=d.baseline_rig.linear)
+    levels = (d.residual_rms, *([d.extended_residual_rms] if d.causes else []))
+    rms, noise = (words.quantity(v[main], unit) for v in levels), words.quantity(d.noise_rms[main], unit)
+    change = f"{residual_change(d, main)} times the noise ({' → '.join(rms)}, noise {noise})"
+    yield "residual", f"{words.channel(main)} {change}"
     if left := left_channel(d):
         yield "", f"{words.channel(left)} {residual_change(d, left)} times the noise"
     for cause in d.causes:
@@ -378,7 +354,11 @@ def _rows(d: Diagnosis, unclear: Sequence[str]) -> Iterator[tuple[str, str]]:
         worst: dict[str, Misfit] = {}  # in each respect
         for m in sorted(d.misfit, key=lambda m: -m.times_noise):
             worst.setdefault(m.what, m)
-        yield "wrong at", "; ".join(misfit(m) for m in list(worst.values())[:_MOST])
+        where = [
+            f"{respect(m.what)} {words.span(m.low, m.high, m.unit)} ({words.times(m.times_noise)} times)"
+            for m in worst.values()
+        ]
+        yield "wrong at", "; ".join(where[:_MOST])
     for rival in fitted_rivals(d)[:_MOST]:
         yield "rejected", f"{rival.name}: {prose(rejection(rival))}"
     if d.rejected:
