@@ -136,9 +136,7 @@ def _print(advice: Advice, report: Path) -> None:
 
     say(verdict(advice))
     for name, sure in possible_rows(advice):
-        say(f"possible    {name}: {sure}", indent=LABEL)
-    for name, probability in advice.excluded.items():
-        say(f"excluded    {plain_name(name)} by the records: probability {probability:.1g}", indent=LABEL)
+        say(f"cause       {name}: {sure}", indent=LABEL)
     p = advice.proposal
     if p is not None:
         for i, a in enumerate(p.names):

@@ -80,10 +80,7 @@ def _advice(advice: Advice) -> Iterator[Block]:
         yield key_numbers(
             keys if len(p.names) == 1 else [*keys, (f"{100.0 * p.decided:.0f} %", "expected to be decided")]
         )
-    rows = possible_rows(advice)
-    for name, left in advice.excluded.items():
-        rows.append((plain_name(name), f"excluded by the records: probability {left:.1g}"))
-    yield section("Still possible", table(("cause", "how sure"), rows))
+    yield section("Still possible", table(("cause", "how sure"), possible_rows(advice)))
     if p is not None:
         yield from [_separations(p)] if len(p.names) > 1 else []
         yield command_figure(p)
@@ -236,13 +233,12 @@ def verdict(advice: Advice) -> str:
 
 
 def possible_rows(advice: Advice) -> list[tuple[str, str]]:
-    """Return each cause still possible and how sure it is beside the others; one alone has no rival here."""
-    if len(advice.hypotheses) == 1:
-        return [(plain_name(advice.hypotheses[0].name), "no rival given")]
-    return [
-        (plain_name(h.name), f"probability {words.probability(h.probability)} among these")
-        for h in advice.hypotheses
-    ]
+    """Return each cause and how sure it is beside the others; one alone has no rival here."""
+    sure = [f"probability {words.probability(h.probability)} among these" for h in advice.hypotheses]
+    sure = sure if len(sure) > 1 else ["no rival given"]
+    rows = [(h.name, text) for h, text in zip(advice.hypotheses, sure, strict=True)]
+    rows += [(n, f"excluded by the records: probability {p:.1g}") for n, p in advice.excluded.items()]
+    return [(plain_name(name), text) for name, text in rows]
 
 
 def _narrowing(hypothesis: Hypothesis, p: Proposal) -> str:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.table import Table
+from rich.table import Column, Table
 
 from rsea_ros.documents.wording import list_names
 from rsea_ros.identification.identify import explained_by_lost_cycles
@@ -306,15 +306,12 @@ def terminal_table(identification: Identification, truth: Mapping[str, float] | 
     def inside(p: ParameterEstimate) -> str:
         return "[green]yes[/]" if p.ci95[0] <= known[p.name] <= p.ci95[1] else "[red]no[/]"
 
-    table = Table(box=None, pad_edge=False, title_justify="left", header_style="dim")
-    for title, justify in (
-        ("parameter", "left"), ("value ± 95 %", "right"), ("unit", "left"), ("rig", "right"),
-    ):  # fmt: skip
-        table.add_column(title, justify=justify, style="dim" if title == "unit" else None)  # type: ignore[arg-type]
-    if truth is not None:
-        table.add_column("true", justify="right")
-        table.add_column("in interval")
-    table.add_column("determined by data")
+    known_too: list[Column | str] = [] if truth is None else [Column("true", justify="right"), "in interval"]
+    table = Table(
+        "parameter", Column("value ± 95 %", justify="right"), Column("unit", style="dim"),
+        Column("rig", justify="right"), *known_too, "determined by data",
+        box=None, pad_edge=False, title_justify="left", header_style="dim",
+    )  # fmt: skip
     for p in identification.parameters:
         if not p.name.startswith(CLOCKS):
             cells = [p.name, "".join(value_text(p)), words.unit(p.unit), words.number(p.start, 4)]
