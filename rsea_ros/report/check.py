@@ -12,20 +12,13 @@ from rsea_ros.checks.finding import Finding, Findings, worst
 from rsea_ros.checks.pairs import Pair
 from rsea_ros.documents.wording import list_names
 from rsea_ros.outputs.new_files import Destination, NewFiles
-from rsea_ros.records.record import UNITS, FloatArray, Record
+from rsea_ros.records.record import UNITS, Record
 from rsea_ros.records.stamps import repair_stamps
-from rsea_ros.report import page as html, words
+from rsea_ros.report import page as html, result_files as outputs, words
 from rsea_ros.report.figures.figure import BEFORE, MEASURED, QUIET, Figure, axis, label, layout, line
+from rsea_ros.report.figures.overlay import extremes
 from rsea_ros.report.remark_words import rig_in_brackets
-from rsea_ros.report.result_files import (
-    CHECK_JSON,
-    REPORT,
-    Provenance,
-    fault_json,
-    json_text,
-    pick,
-    strict,
-)
+from rsea_ros.report.result_files import Provenance, pick, strict
 from rsea_ros.report.words import WIDTH, wrap
 
 SCHEMA = 1
@@ -47,10 +40,7 @@ def check_lines(findings: Findings, width: int = WIDTH) -> Iterator[Text]:
     """
     for f in _each_remedy_once(findings.findings):
         head = f"{f.light:<{_LIGHT}}{f'{kind(f)} ':<{_KIND}}{f'{_channel(f)} ':<{_CHANNEL}}"
-        said = f"{number(f)} {f.detail}" if f.unit == "1" else ", ".join(filter(None, (number(f), f.detail)))
-        if f.light != "green":
-            said = "; ".join(filter(None, (said, f.expected and f"expected {f.expected}", f.remedy)))
-        text = wrap(f"{head}{said}", width, min(len(head), _LIGHT + _KIND + _CHANNEL))
+        text = wrap(f"{head}{_said(f)}", width, min(len(head), _LIGHT + _KIND + _CHANNEL))
         yield Text.assemble((text[:_LIGHT], _STYLES[f.light]), text[_LIGHT:])
 
 
@@ -75,10 +65,14 @@ def _each_remedy_once(findings: Iterable[Finding]) -> Iterator[Finding]:
 
 def sentence(f: Finding) -> str:
     """Return a finding as one line."""
-    subject = " ".join(filter(None, (f"{f.light}:", kind(f), _channel(f))))
-    text = " ".join(filter(None, (number(f), f.detail))) or "none"
-    parts = (f"{subject}: {text}", f"expected {f.expected}" if f.expected else "", f.remedy)
-    return "; ".join(filter(None, parts))
+    return f"{' '.join(filter(None, (f'{f.light}:', kind(f), _channel(f))))}: {_said(f)}"
+
+
+def _said(f: Finding) -> str:
+    """Return number and detail; where the light is not green, what is expected and the remedy too."""
+    found = (" " if f.unit == "1" else ", ").join(filter(None, (number(f), f.detail)))
+    more = () if f.light == "green" else (f.expected and f"expected {f.expected}", f.remedy)
+    return "; ".join(filter(None, (found, *more)))
 
 
 def kind(f: Finding) -> str:
@@ -121,7 +115,7 @@ def check_json(checks: Sequence[Findings]) -> dict[str, Any]:
         "light": worst([c.light for c in checks]),
         "records": [
             {**pick(c, "bag=source light"), "findings": [_finding(f) for f in c.findings],
-             "faults": [fault_json(f) for f in c.faults], "pairs": [_pair(p) for p in c.pairs]}
+             "faults": [outputs.fault_json(f) for f in c.faults], "pairs": [_pair(p) for p in c.pairs]}
             for c in checks
         ],
     }  # fmt: skip
@@ -142,8 +136,8 @@ def write_check(
 ) -> Path:
     """Write check.json and report.html, and return the report's path: both or none."""
     with NewFiles(out) as new:
-        new.write(CHECK_JSON, json_text(check_json(checks), provenance))
-        return new.write(REPORT, check_report(checks, records, provenance))
+        new.write(outputs.CHECK_JSON, outputs.json_text(check_json(checks), provenance))
+        return new.write(outputs.REPORT, check_report(checks, records, provenance))
 
 
 def check_report(
@@ -191,8 +185,8 @@ _OF_A_PAIR = (
     ("#late by, ms", lambda p: words.number(1e3 * p.lag, 3)),
     ("#in common", lambda p: f"{100.0 * p.coherence:.0f} %"),
 )  # fmt: skip
-_MOST = 800
-"""Blocks of a drawn channel: more than a screen has columns for."""
+_MOST = 1600
+"""Samples of a drawn channel: more than a screen has columns for."""
 
 
 def _over_time(c: Findings, record: Record) -> Figure:
@@ -209,7 +203,8 @@ def _over_time(c: Findings, record: Record) -> Figure:
         for values, colour in ((channel.y, MEASURED), (np.where(masked, channel.y, np.nan), BEFORE)):
             if colour == MEASURED or masked.any():
                 hover = f"%{{y:.4g}} {words.unit(UNITS[name])}"
-                data.append(line(*_envelope(channel.t, values), words.channel(name), colour, 1.0,
+                keep = extremes(_MOST, values)
+                data.append(line(channel.t[keep], values[keep], words.channel(name), colour, 1.0,
                                  yaxis=f"y{mark}", hovertemplate=hover))  # fmt: skip
     last = f"y{len(record.channels)}" if len(record.channels) > 1 else "y"
     drawn = layout(xaxis=axis("time, s", anchor=last), annotations=names, **parts,
@@ -217,15 +212,3 @@ def _over_time(c: Findings, record: Record) -> Figure:
     left_out = any(mask.any() for mask in c.masked.values())
     caption = "Orange: samples that must not count." if left_out else "Least and largest value each moment."
     return Figure("Every channel over time", caption, data, drawn, 110 * len(record.channels) + 60)
-
-
-def _envelope(t: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return a channel with the least and the largest value of each of at most _MOST blocks."""
-    size = -(-len(t) // _MOST)
-    if size < 3:
-        return t, y
-    whole = len(t) // size * size
-    blocks = y[:whole].reshape(-1, size)
-    filled = np.where(np.isnan(blocks), np.inf, blocks), np.where(np.isnan(blocks), -np.inf, blocks)
-    ends = np.stack([filled[0].min(axis=1), filled[1].max(axis=1)], axis=1).ravel()
-    return np.repeat(t[:whole:size], 2), np.where(np.isfinite(ends), ends, np.nan)

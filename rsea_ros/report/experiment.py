@@ -159,8 +159,8 @@ def _session(outcome: CampaignOutcome, limits: RunLimits) -> Iterator[Block]:
     yield probability_figure(outcome)
     rows = []
     for k, r in enumerate(outcome.rounds):
-        order = by_probability(r.weighing, 0.0)
-        possible = ", ".join(f"{plain_name(n)} {p:.2f}" for n, p in order[:_ROWS] if p >= _SHOWN)
+        order = by_probability(r.weighing, _SHOWN)
+        possible = ", ".join(f"{plain_name(n)} {p:.2f}" for n, p in order[:_ROWS])
         run = f"{shape_words(r.proposal)}; {r.proposal.resolved:.0%} expected" if r.proposal else ""
         rows.append((f"run {k}" if k else "first records", possible, size(r.weighing, order[0][0]), run))
     yield section("Run by run", table(("after", "possible", "size of the likeliest", "next run"), rows))
@@ -175,8 +175,8 @@ def probability_figure(outcome: CampaignOutcome) -> fig.Figure:
     """Return the probability of each cause before the first run and after each."""
     rounds = [r.weighing.probability for r in outcome.rounds]
     x = np.arange(len(rounds), dtype=float)
-    names = sorted({n for r in rounds for n, p in r.items() if p >= _SHOWN})
-    names.sort(key=lambda n: -rounds[-1].get(n, 0.0))
+    shown = {n for r in rounds for n, p in r.items() if p >= _SHOWN}
+    names = sorted(shown, key=lambda n: (-rounds[-1].get(n, 0.0), n))
     traces = []
     for k, name in enumerate(names):
         colour = _COLOURS[k] if k < len(_COLOURS) else fig.QUIET

@@ -31,7 +31,7 @@ def overlay_figure(
 
     It opens with the `view` s in which a signal moves most. lively: that signal, by default the measured one.
     """
-    keep = sample_extremes(measured, measured - simulations[-1].values)
+    keep = extremes(MOST_SAMPLES, measured, measured - simulations[-1].values)
     pauses = pauses_of(t[keep])
     shown = measured[keep]
     shown[list(pauses)] = np.nan
@@ -77,16 +77,18 @@ def _fineness(values: FloatArray, part: float) -> float:
     return part * float(np.nanstd(values)) if np.isfinite(values).any() else 0.0
 
 
-def sample_extremes(measured: FloatArray, residual: FloatArray) -> npt.NDArray[np.int64]:
-    """Return the indices that stay when a trace is too long: the extremes of both in each block."""
-    n = len(measured)
-    if n <= MOST_SAMPLES:
+def extremes(most: int, *signals: FloatArray) -> npt.NDArray[np.int64]:
+    """Return the indices that stay of traces that are too long: the extremes of each in each block.
+
+    most: samples. Not-a-number is never an extreme.
+    """
+    n, block = len(signals[0]), -(-2 * len(signals) * len(signals[0]) // most)
+    if n <= most:
         return np.arange(n)
-    block = -(-4 * n // MOST_SAMPLES)
     starts = np.arange(0, n - block + 1, block)
-    kept = [starts + np.argmax(sign * v[: len(starts) * block].reshape(-1, block), axis=1)
-            for v in (measured, residual) for sign in (-1.0, 1.0)]  # fmt: skip
-    return np.unique(np.concatenate([*kept, [n - 1]]))
+    levels = (np.where(np.isnan(v), -np.inf, sign * v) for v in signals for sign in (-1.0, 1.0))
+    blocks = (level[: len(starts) * block].reshape(-1, block) for level in levels)
+    return np.unique(np.concatenate([*(starts + b.argmax(axis=1) for b in blocks), [n - 1]]))
 
 
 def _liveliest(t: FloatArray, signal: FloatArray, view: float) -> tuple[float, float]:

@@ -12,10 +12,10 @@ from rsea_ros.diagnosis.residual_analysis import by_frequency
 from rsea_ros.report.figures.figure import AFTER, BEFORE, Curve, line
 from rsea_ros.report.figures.overlay import (
     MOST_SAMPLES,
+    extremes,
     overlay_figure,
     pack,
     pauses_of,
-    sample_extremes,
     without,
 )
 from rsea_ros.report.figures.spectrum import density, residual_figure
@@ -42,7 +42,7 @@ def test_long_traces_keep_their_extremes() -> None:
     y = np.random.default_rng(5).standard_normal(500_000)
     residual = 0.01 * y
     y[123_456], residual[333_333] = 50.0, -9.0
-    keep = sample_extremes(y, residual)
+    keep = extremes(MOST_SAMPLES, y, residual)
     assert len(keep) <= MOST_SAMPLES
     assert 123_456 in keep
     assert 333_333 in keep
