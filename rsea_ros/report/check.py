@@ -144,20 +144,15 @@ def check_report(
     checks: Sequence[Findings], records: Sequence[Record], provenance: Provenance | None = None
 ) -> str:
     """Return the page of a check: what to put right, the channels over time, what they say of each other."""
-    named = {
-        light: list(dict.fromkeys(_subject(f) for c in checks for f in c.findings if f.light == light))
-        for light in ("red", "amber")
-    }
+    findings = [f for c in checks for f in c.findings]
+    every = [(f.light, " of the ".join(filter(None, (kind(f), _channel(f))))) for f in findings]
+    red, amber = ([name for of, name in every if of == light] for light in ("red", "amber"))
     title = "Nothing stands against a fit"
-    if worse := named["red"] or named["amber"]:
-        title = f"{'Put right' if named['red'] else 'Look at'} before a fit: {list_names(worse)}"
+    if worse := list(dict.fromkeys(red or amber)):
+        title = f"{'Put right' if red else 'Look at'} before a fit: {list_names(worse)}"
     blocks = (block for c, r in zip(checks, records, strict=True) for block in _blocks(c, r))
     return html.page(title, f"Check of {', '.join(c.source for c in checks)}", blocks,
                      [f"{summary(checks)}. rsea check. All values in SI."], provenance)  # fmt: skip
-
-
-def _subject(f: Finding) -> str:
-    return " of the ".join(filter(None, (kind(f), _channel(f))))
 
 
 def _blocks(c: Findings, record: Record) -> Iterator[html.Block]:

@@ -12,7 +12,6 @@ from rsea_ros.control.robustness import Reach, Spread
 from rsea_ros.control.study import AtRate, Compensated, Study, TrialResult
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.transfer import end_response
-from rsea_ros.records.record import ComplexArray, FloatArray
 from rsea_ros.report import words
 from rsea_ros.report.figures import figure as fig
 from rsea_ros.report.figures.response import Band, Mark, ResponseCurve, response_figure
@@ -83,20 +82,16 @@ def _following(study: Study) -> list[fig.Figure]:
     reached = " and ".join(f"{at.locked.bandwidth:.0f} Hz at {at.design.rate:g} Hz" for at in study.rates)
     locked = f"Held at both ends, torque follows to {reached}"
     return [
-        _following_figure(study, study.rig, locked, [(at.locked, at.locked_spread) for at in study.rates]),
-        _following_figure(
-            study, study.free, free, [(at.free, at.free_spread) for at in study.rates], LEARNING
-        ),
+        _following_figure(study, study.rig, locked, "locked"),
+        _following_figure(study, study.free, free, "free", LEARNING),
     ]
 
 
-def _following_figure(
-    study: Study, rig: Rig, title: str, seen: Sequence[tuple[Following, Spread]], more: str = ""
-) -> fig.Figure:
-    curves = [
-        ResponseCurve(rate, colour, c.hz, c.torque, 2.0, band=_band(c, apart), phase=c.phase)
-        for rate, (c, apart), colour in zip(rates(study), seen, _COLOURS, strict=False)
-    ]
+def _following_figure(study: Study, rig: Rig, title: str, load: str, more: str = "") -> fig.Figure:
+    curves = []
+    for rate, at, colour in zip(rates(study), study.rates, _COLOURS, strict=False):
+        c, apart = getattr(at, load), getattr(at, f"{load}_spread")
+        curves.append(ResponseCurve(rate, colour, c.hz, c.torque, 2.0, "", _band(c, apart), c.phase))
     hz = np.geomspace(1.0, 0.45 * max(at.design.rate for at in study.rates), 300)
     opened = end_response(rig, hz)
     curves.append(ResponseCurve("without control", fig.MEASURED, hz, opened, 1.2, "dot"))
@@ -118,15 +113,14 @@ def _band(curve: Following, apart: Spread) -> Band:
 def _impedance_figure(study: Study) -> fig.Figure:
     first, bands, lines = study.rates[0].impedance, [], []
 
-    def drawn(name: str, hz: FloatArray, z: ComplexArray, colour: str, dash: str) -> fig.Json:
-        look: fig.Json = {"line": {"color": colour, "width": 1.8, "dash": dash}}
-        return fig.line(hz, np.abs(z), name, colour, hovertemplate="%{y:.3g} N·m per rad/s", **look)
-
+    hover: fig.Json = {"hovertemplate": "%{y:.3g} N·m per rad/s"}
     for rate, at, colour in zip(rates(study), study.rates, _COLOURS, strict=False):
         bands.append(fig.band(at.softness.hz, at.softness.low, at.softness.high, fig.faint(colour, 0.18)))
-        lines.append(drawn(rate, at.impedance.hz, at.impedance.controlled, colour, "solid"))
-    lines.append(drawn("motor off", first.hz, first.motor_off, fig.QUIET, "dash"))
-    lines.append(drawn("passive spring", first.hz, first.spring, fig.MEASURED, "dot"))
+        z = at.impedance
+        lines.append(fig.line(z.hz, np.abs(z.controlled), rate, colour, 1.8, **hover))
+    off, spring = np.abs(first.motor_off), np.abs(first.spring)
+    lines.append(fig.line(first.hz, off, "motor off", fig.QUIET, 1.8, "dash", **hover))
+    lines.append(fig.line(first.hz, spring, "passive spring", fig.MEASURED, 1.8, "dot", **hover))
     one = int(np.argmin(np.abs(first.hz - 1.0)))
     softer = abs(first.spring[one]) / abs(first.controlled[one])
     highest = max(float(at.impedance.hz[-1]) for at in study.rates)

@@ -131,8 +131,8 @@ def spectrum_figure(runs: Sequence[tuple[str, Proposal]]) -> fig.Figure:
     for k, (name, p) in enumerate(runs):
         f, density = density_of(p.command, p.rate)
         colour = (fig.AFTER, fig.BEFORE, fig.QUIET)[k % 3]
-        look: fig.Json = {"line": {"color": colour, "width": 1.4, "dash": _DASH[k % 4]}}
-        traces.append(fig.line(f, density, name, colour, hovertemplate="%{y:.3g} N·m/√Hz", **look))
+        hover = "%{y:.3g} N·m/√Hz"
+        traces.append(fig.line(f, density, name, colour, 1.4, _DASH[k % 4], hovertemplate=hover))
     top = float(np.log10(max(y for trace in traces for y in trace["y"])))
     height = fig.axis("N·m/√Hz", type="log", range=[top - 3.0, top + 0.3])
     title = "Where the runs put their power" if len(runs) > 1 else "Where the run puts its power"
@@ -181,7 +181,7 @@ def probability_figure(outcome: CampaignOutcome) -> fig.Figure:
     for k, name in enumerate(names):
         colour = _COLOURS[k] if k < len(_COLOURS) else fig.QUIET
         y, dot = np.array([r.get(name, 0.0) for r in rounds]), {"size": 7, "color": colour}
-        hover = {"mode": "lines+markers", "marker": dot, "hovertemplate": "probability %{y:.3f}"}
+        hover: fig.Json = {"mode": "lines+markers", "marker": dot, "hovertemplate": "probability %{y:.3f}"}
         traces.append(fig.line(x, y, plain_name(name), colour, 2.2, **hover))
     ticks = ["first records" if not k else f"after run {k}" for k in range(len(rounds))]
     drawing = fig.layout(

@@ -89,7 +89,11 @@ def _verdict(d: Diagnosis) -> tuple[str, str]:
     elif d.at_noise_floor:
         how, end = f"probably {explains} the misfit", ", but another law may do the same"
     else:
-        how, rest, end = f"{explains} {part} of the misfit", "the rest stays unexplained", "; " + _rest(d)
+        how, rest = f"{explains} {part} of the misfit", "the rest stays unexplained"
+        end, worst = f"; {rest}", left_channel(d)
+        if worst:
+            times = words.times(times_noise(d, worst)[1])
+            end = f"; the {words.channel(worst)} residual stays at {times} times the noise"
     left = f"{after:.2f}" if d.at_noise_floor or d.verdict == "explained" else words.times(after)
     named = list_names([words.effect(c.name) for c in d.causes])
     falls = f"falls from {words.times(before)} to {left}" if after < before else f"stays at {left}"
@@ -105,12 +109,6 @@ def _noise_left(d: Diagnosis, noise: str) -> str:
         if s.channel == d.channel and peak:
             return f"little more than noise is left, at most {peak}"
     return f"{noise} is left"
-
-
-def _rest(d: Diagnosis) -> str:
-    left = left_channel(d)
-    stays = f"stays at {words.times(times_noise(d, left)[1])} times the noise" if left else ""
-    return f"the {words.channel(left)} residual {stays}" if left else "the rest stays unexplained"
 
 
 def cause_list(causes: Sequence[Cause]) -> str:

@@ -62,6 +62,10 @@ def numbers(values: FloatArray) -> list[float | None]:
     return [float(f"{v:.8g}") if np.isfinite(v) else None for v in np.asarray(values, dtype=float)]
 
 
+def _places(values: FloatArray | list[str]) -> list[Any]:
+    return list(values) if isinstance(values, list) else numbers(values)
+
+
 def layout(**parts: Any) -> Json:
     """Return a layout in the style of the page; `parts` go on top."""
     base: Json = {
@@ -112,8 +116,11 @@ def frequency_axis(low: float, high: float, **parts: Any) -> Json:
     return log_axis("frequency, Hz", low, high, **hover, **parts)
 
 
-def line(x: FloatArray, y: FloatArray, name: str, colour: str, width: float = 1.6, **parts: Any) -> Json:
-    """Return a line trace.
+def line(
+    x: FloatArray | list[str], y: FloatArray, name: str, colour: str, width: float = 1.6, dash: str = "",
+    **parts: Any,
+) -> Json:  # fmt: skip
+    """Return a line trace. x: numbers, or dates as text. dash: of plotly, solid by default.
 
     Raises ValueError without a hovertemplate (the value with its unit) and without a hoverinfo.
     """
@@ -122,20 +129,21 @@ def line(x: FloatArray, y: FloatArray, name: str, colour: str, width: float = 1.
     trace: Json = {
         "type": "scatter",
         "mode": "lines",
-        "x": numbers(x),
+        "x": _places(x),
         "y": numbers(y),
         "name": name,
-        "line": {"color": colour, "width": width},
+        "line": {"color": colour, "width": width, **({"dash": dash} if dash else {})},
     }
     return {**trace, **parts}
 
 
-def band(x: FloatArray, low: FloatArray, high: FloatArray, colour: str, **parts: Any) -> Json:
-    """Return a filled band from low to high, without hover."""
+def band(x: FloatArray | list[str], low: FloatArray, high: FloatArray, colour: str, **parts: Any) -> Json:
+    """Return a filled band from low to high, without hover. x: numbers, or dates as text."""
+    places = _places(x)
     return {
         "type": "scatter",
         "mode": "lines",
-        "x": numbers(np.concatenate([x, x[::-1]])),
+        "x": [*places, *places[::-1]],
         "y": numbers(np.concatenate([high, low[::-1]])),
         "fill": "toself",
         "fillcolor": colour,

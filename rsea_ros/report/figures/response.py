@@ -47,7 +47,7 @@ class ResponseCurve:
     hz: FloatArray
     values: ComplexArray
     width: float = 1.8
-    dash: str = "solid"
+    dash: str = ""
     band: Band | None = None
     phase: FloatArray | None = None
     opacity: float = 1.0
@@ -82,7 +82,7 @@ def _traces(responses: Sequence[ResponseCurve]) -> Iterator[fig.Json]:
             shade = fig.faint(r.colour, 0.18)
             yield fig.band(r.band.hz, *r.band.gain, shade)
             yield fig.band(r.band.hz, *r.band.phase, shade, yaxis="y2")
-        look: fig.Json = {"line": {"color": r.colour, "width": r.width, "dash": r.dash}}
+        look: fig.Json = {"width": r.width, "dash": r.dash}
         look |= {"opacity": r.opacity} if r.opacity < 1.0 else {}
         gain = 20.0 * np.log10(np.abs(r.values))
         yield fig.line(r.hz, gain, r.name, r.colour, hovertemplate="%{y:.2f} dB", **look)
@@ -127,7 +127,7 @@ def bode_figure(measured: FrequencyResponse, model: ComplexArray | None = None) 
     phase = np.degrees(np.unwrap(np.angle(reference)) + np.angle(response / reference))
     turn = np.degrees(np.arcsin(np.minimum(side, 1.0)))
     band = Band(hz, (gain + low, gain + high), (phase - turn, phase + turn))
-    curves = [ResponseCurve("measured", fig.MEASURED, hz, response, 5.0, "solid", band, phase, 0.55)]
+    curves = [ResponseCurve("measured", fig.MEASURED, hz, response, 5.0, "", band, phase, 0.55)]
     curves += [] if fit is None else [ResponseCurve("model", fig.AFTER, hz, fit, 1.6)]
     data = list(_traces(curves))
     limit = 1.0

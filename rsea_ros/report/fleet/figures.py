@@ -165,18 +165,11 @@ def _weeks(bins: Binned, trend: Trend, steps: Steps, factor: float, unit: str) -
     ]  # fmt: skip
 
 
-def _fan(x: list[str], y: list[float | None], colour: str) -> fig.Json:
-    return {"type": "scatter", "mode": "lines", "x": x, "y": y, "fill": "toself", "line": {"width": 0},
-            "fillcolor": colour, "hoverinfo": "skip"}  # fmt: skip
-
-
 def _course(trend: Trend, factor: float) -> list[fig.Json]:
     assert trend.curve is not None
     c, x = trend.curve, say.dates(*trend.curve.time_s)
-    sides = fig.numbers(np.concatenate([c.high, c.low[::-1]]) * factor)
-    look: fig.Json = {"mode": "lines", "hoverinfo": "skip", "line": {"color": fig.AFTER, "width": 2}}
-    middle = fig.points(x, fig.numbers(c.value * factor), "trend", **look)
-    return [_fan([*x, *x[::-1]], sides, fig.faint(fig.AFTER, 0.16)), middle]
+    sides = fig.band(x, c.low * factor, c.high * factor, fig.faint(fig.AFTER, 0.16))
+    return [sides, fig.line(x, c.value * factor, "trend", fig.AFTER, 2, hoverinfo="skip")]
 
 
 def _ahead(trend: Trend, steps: Steps, factor: float) -> tuple[list[fig.Json], float]:
@@ -190,16 +183,9 @@ def _ahead(trend: Trend, steps: Steps, factor: float) -> tuple[list[fig.Json], f
         until = min(until, trend.to_limit_s.high)
     years = (until - last) / (YEAR * DAY)
     ends = Interval(*(n + years * s for n, s in zip(now, slope, strict=True)))
-    sides = fig.numbers(np.array([now.high, ends.high, ends.low, now.low]) * factor)
-    look: fig.Json = {
-        "mode": "lines",
-        "hoverinfo": "skip",
-        "line": {"color": fig.BEFORE, "width": 1.6, "dash": "dash"},
-    }
-    middle = fig.points(
-        say.dates(last, until), fig.numbers(np.array([now.value, ends.value]) * factor), "forecast", **look
-    )
-    return [_fan(say.dates(last, until, until, last), sides, fig.faint(fig.BEFORE, 0.15)), middle], until
+    x, (value, low, high) = say.dates(last, until), factor * np.array([now, ends]).T
+    sides = fig.band(x, low, high, fig.faint(fig.BEFORE, 0.15))
+    return [sides, fig.line(x, value, "forecast", fig.BEFORE, 1.6, "dash", hoverinfo="skip")], until
 
 
 def _label(change: Change, trend: Trend) -> fig.Json:

@@ -74,14 +74,15 @@ def _blocks(
     changes, causes = kinds.count("trend") + kinds.count("change"), [a for a in ranked if a.kind == "cause"]
     always = sum(a.from_first for a in causes)
     since = f", {always} from the first recording on" if always else " that appeared"
-    done = int(np.sum(np.asarray(recordings["outcome"], str) == "done"))
+    done = np.asarray(recordings["outcome"], str) == "done"
+    used, every = (f"{n:,}".replace(",", " ") for n in (np.sum(done), len(done)))
     latest = say.latest_causes(joints, recordings)
     look = len({*groups, *latest}) if _has_no_trend(fleet) else len(groups)
     yield key_numbers([
         (f"{look} of {len(fleet.joints)}", f"{say.plural(len(fleet.joints), 'joint')} to look at"),
         (str(changes), f"{say.plural(changes, 'change')}, {kinds.count('trend')} going on"),
         (str(len(causes)), f"{say.plural(len(causes), 'cause')}{since}"),
-        (_grouped(done), f"recordings used, of {_grouped(len(recordings['joint']))}"),
+        (used, f"recordings used, of {every}"),
         (str(len(silent)), f"of {len(fleet.trends)} trends cannot be determined now"),
     ])  # fmt: skip
     yield from timeline(ranked, steps)
@@ -136,10 +137,6 @@ def _headline(fleet: FleetTrends, alarms: Sequence[Alarm], recordings: Table) ->
     first = next(iter(groups))
     number = f"{len(groups)} of {len(fleet.joints)} joints need" if len(groups) > 1 else "One joint needs"
     return f"{number} a look, {first} first: {say.about(groups[first][0])}"
-
-
-def _grouped(number: int) -> str:
-    return f"{number:,}".replace(",", " ")
 
 
 def _sure(fleet: FleetTrends) -> list[str]:
