@@ -74,9 +74,9 @@ def slices(title: str, shown: Sequence[Point], caption: str = "") -> fig.Figure:
         at: fig.Json = {"xref": f"x{which}", "yref": f"y{which}", "xshift": 6}
         names.append(fig.label(name, float(np.log10(x[-1])), float(np.log10(y[-1])), shade, **at))
     for p in shown:
-        z, dot = [float(undamped_band(p.stiffness, p.inertia))], {"size": 9, "color": p.colour}
-        data.append(fig.points([1e3 * abs(p.inertia)], z, p.name, marker=dot))
-        data.append(fig.points([p.stiffness], z, p.name, marker=dot, xaxis="x2", yaxis="y2"))
+        z = [float(undamped_band(p.stiffness, p.inertia))]
+        data.append(fig.points([1e3 * abs(p.inertia)], z, p.name, p.colour, 9))
+        data.append(fig.points([p.stiffness], z, p.name, p.colour, 9, xaxis="x2", yaxis="y2"))
     ticks = fig.marks(0.5, 2000.0)
     decades = {"type": "log", "tickvals": ticks, "ticktext": [f"{v:g}" for v in ticks]}
     drawing = fig.layout(

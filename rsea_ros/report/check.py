@@ -21,7 +21,6 @@ from rsea_ros.report.remark_words import rig_in_brackets
 from rsea_ros.report.result_files import Provenance, pick, strict
 from rsea_ros.report.words import WIDTH, wrap
 
-SCHEMA = 1
 _LIGHT, _KIND, _CHANNEL = 7, 14, 25
 """Columns."""
 _STYLES = {"green": "green", "amber": "yellow", "red": "bold red"}
@@ -108,7 +107,7 @@ def check_json(checks: Sequence[Findings]) -> dict[str, Any]:
     """Return the contents of the JSON of `rsea check`; infinite numbers and NaN are null."""
     first = checks[0]
     return {
-        "schema": SCHEMA,
+        "schema": 1,
         **pick(first, "rig=rig_name"),
         "rig_option": first.rig_choice.option or None,
         "rig_is_default": first.rig_choice.is_default,

@@ -119,7 +119,7 @@ def _map(designs: Sequence[SpringDesign]) -> fig.Figure:
         names.append(fig.label(name, 1.01, float(np.log10(k[-1])), colour, xref="paper"))
     for d, colour in zip(designs, _COLOURS, strict=False):
         x, k_s = 1e3 * r.inertia, d.stiffness
-        data.append(fig.points([x], [k_s], f"{k_s:.0f}", marker={"size": 10, "color": colour}, **hover))
+        data.append(fig.points([x], [k_s], f"{k_s:.0f}", colour, 10, **hover))
         at = float(np.log10(x)), float(np.log10(k_s))
         names.append(fig.label(f"<b>{k_s:.0f}</b>", *at, colour, xshift=8, yshift=-11))
     alone = f"{float(undamped_stiffness(r.bandwidth, unit.spin)):.0f} N·m/rad"

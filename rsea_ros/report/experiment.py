@@ -197,8 +197,6 @@ def probability_figure(outcome: CampaignOutcome) -> fig.Figure:
     return fig.Figure("Remaining causes after each run", caption, traces, drawing, height=360)
 
 
-SCHEMA = 1
-
 _NARROWER = 1.01
 """Factor below which a run does not narrow an interval."""
 LEVEL_WORDS = (
@@ -350,7 +348,7 @@ def run_count(outcome: CampaignOutcome) -> tuple[str, str]:
 def advice_json(advice: Advice) -> dict[str, Any]:
     """Return the contents of experiment.json. Infinite numbers are null."""
     return {
-        "schema": SCHEMA, "sentence": verdict(advice),
+        "schema": 1, "sentence": verdict(advice),
         "causes": {h.name: strict(h.probability) for h in advice.hypotheses},
         "excluded": strict(advice.excluded), "limits": strict(advice.asked.limits.finite_limits()),
         "limits_hold_with_probability": LEVEL, "run": _run(advice.proposal),
@@ -362,7 +360,7 @@ def campaign_json(outcome: CampaignOutcome, campaign: Campaign) -> dict[str, Any
     """Return the contents of experiment.json of a session."""
     shared = outcome.shared
     return {
-        "schema": SCHEMA,
+        "schema": 1,
         "end": outcome.end,
         "sentence": end_sentence(outcome),
         **pick(outcome, "cause why"),

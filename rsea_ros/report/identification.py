@@ -74,13 +74,12 @@ def _blocks(i: Identification) -> Iterator[html.Block]:
     models = i.models or (None,) * len(i.responses)
     yield from map(bode_figure, i.responses, models)
     by_name = {o.channel: o for o in i.overlays}  # the motor torque only repeats the command
-    for overlay in [by_name[n] for n in SENSED if n in by_name] or i.overlays:
-        n, o = overlay.channel, overlay
-        named = words.channel(n), words.unit(UNITS[n])
+    for o in [by_name[n] for n in SENSED if n in by_name] or i.overlays:
+        n, named = o.channel, (words.channel(o.channel), words.unit(UNITS[o.channel]))
         left = f"{i.fit_percent[n]:.2f} % explained, {words.quantity(i.residual_rms[n], UNITS[n])} RMS left"
-        title = words.sentence(f"{words.channel(n)} over time: {left}")
+        title = words.sentence(f"{named[0]} over time: {left}")
         yield overlay_figure(title, *named, o.t, o.measured, [Curve("simulated", AFTER, o.simulated)])
-        yield _over_frequency(i, overlay)
+        yield _over_frequency(i, o)
     yield undetermined_section(doubt_sentences(i), i.remarks)
     physical = [k for k, p in enumerate(i.parameters) if not p.name.startswith("clock.")]
     names = [i.parameters[k].name for k in physical]
@@ -206,7 +205,6 @@ def _cell(value: float) -> str:
     return html.Html(f"<span style='background:{shade}'>{words.minus(f'{value:.2f}')}</span>")
 
 
-SCHEMA = 1
 _LOST = (
     "Behind the lost cycles the motor torque is further from its commands than elsewhere: the computer was "
     "too busy. Record again on an idle computer, or run the driver with realtime_priority (docs/hardware.md)."
@@ -325,7 +323,7 @@ def identification_json(identification: Identification) -> dict[str, Any]:
     """Return the contents of identification.json; infinite numbers and NaN are null."""
     i = identification
     return {
-        "schema": SCHEMA,
+        "schema": 1,
         "rig": i.rig.name,
         **remarks.rig_json(i.rig_choice, i.remarks),
         "verdict": i.verdict,

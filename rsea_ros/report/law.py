@@ -139,16 +139,15 @@ def over_figure(written: WrittenLaw) -> fig.Figure:
     quantity, unit = ("angle", "rad") if law.place == "encoder" else ("torque", words.unit("N m"))
     centre, low, high, middle, error = _in_bins(x, y, shown.law)
     mean = np.flatnonzero(np.isfinite(middle))[::6]
-    when: fig.Json = {"color": fig.numbers(shown.t), "colorscale": [[0.0, fig.NOISE], [1.0, fig.BEFORE]],
-                      "colorbar": {"title": {"text": "time, s"}, **fig.KEY}}  # fmt: skip
+    shades, key = [[0.0, fig.NOISE], [1.0, fig.BEFORE]], {"title": {"text": "time, s"}, **fig.KEY}
+    look: fig.Json = {"size": 3.5, "opacity": 0.5, "color": fig.numbers(shown.t), "colorscale": shades,
+                      "colorbar": key}  # fmt: skip
     sides: fig.Json = {"type": "data", "array": fig.numbers(error[mean]), "thickness": 1.2, "width": 0,
                        "color": fig.INK}  # fmt: skip
     data: list[fig.Json] = [
-        fig.points(fig.numbers(x), fig.numbers(y), "measured", hoverinfo="skip",
-                   marker={"size": 3.5, "opacity": 0.5, **when}),
+        fig.points(x, y, "measured", fig.NOISE, 3.5, hoverinfo="skip", marker=look),
         fig.band(centre, low, high, fig.faint(fig.AFTER, 0.16)),
-        fig.points(fig.numbers(centre[mean]), fig.numbers(middle[mean]), "mean",
-                   marker={"size": 6, "color": fig.INK}, error_y=sides),
+        fig.points(centre[mean], middle[mean], "mean", fig.INK, 6, error_y=sides),
         fig.line(centre, 0.5 * (low + high), "law", fig.AFTER, 2.6, hovertemplate=f"%{{y:.3g}} {unit}"),
     ]  # fmt: skip
     top = 1.15 * float(np.quantile(np.abs(y), 0.995))
@@ -183,7 +182,6 @@ def _in_bins(x: FloatArray, y: FloatArray, law: FloatArray) -> FloatArray:
     return shown
 
 
-SCHEMA = 1
 _CLEARLY = 0.1
 """Share of what the law leaves that another variable must explain to be reported."""
 _LETTERS = {
@@ -273,7 +271,7 @@ def _parameters(law: Law) -> dict[str, Size]:
 def law_json(result: LawResult) -> dict[str, Any]:
     """Return the contents of law.json."""
     return {
-        "schema": SCHEMA,
+        "schema": 1,
         "rig": result.rig_name,
         "sentence": headline(result),
         "data": pick(result, "bags=sources duration_s=duration"),

@@ -181,7 +181,6 @@ def value_text(value: float | tuple[float, ...]) -> str:
     return ", ".join(f"{v:g}" for v in value) if isinstance(value, tuple) else f"{value:g}"
 
 
-SCHEMA = 1
 NAMESPACES = ("/rsea", "/rsea/simulated_before", "/rsea/simulated_after")
 """Of the three sets of topics in overlay.mcap: measured, simulated without the causes and with them."""
 OverlayWriter = Callable[[Mapping[str, Record], Path], None]
@@ -231,7 +230,7 @@ def diagnosis_json(diagnosis: Diagnosis) -> dict[str, Any]:
         for a in d.alternatives
     ]  # fmt: skip
     return {
-        "schema": SCHEMA,
+        "schema": 1,
         "rig": d.rig_name,
         **remarks.rig_json(d.rig_choice, d.remarks),
         **pick(d, "verdict channel"),

@@ -62,7 +62,7 @@ def numbers(values: FloatArray) -> list[float | None]:
     return [float(f"{v:.8g}") if np.isfinite(v) else None for v in np.asarray(values, dtype=float)]
 
 
-def _places(values: FloatArray | list[str]) -> list[Any]:
+def _places(values: FloatArray | list[Any]) -> list[Any]:
     return list(values) if isinstance(values, list) else numbers(values)
 
 
@@ -168,9 +168,13 @@ def label(text: str, x: float, y: float, colour: str, **parts: Any) -> Json:
     return {**base, **parts}
 
 
-def points(x: FloatArray | Sequence[Any], y: Sequence[float | None], name: str, **parts: Any) -> Json:
-    """Return a trace of points; x: numbers, or dates as text."""
-    return {"type": "scatter", "mode": "markers", "x": list(x), "y": list(y), "name": name, **parts}
+def points(
+    x: FloatArray | list[Any], y: FloatArray | list[Any], name: str, colour: str, size: float, **parts: Any
+) -> Json:
+    """Return a trace of points. x: numbers, or dates as text. size: px."""
+    marker = {"size": size, "color": colour}
+    return {"type": "scatter", "mode": "markers", "x": _places(x), "y": _places(y), "name": name,
+            "marker": marker, **parts}  # fmt: skip
 
 
 def named(traces: Sequence[Json]) -> list[tuple[str, str]]:

@@ -88,11 +88,10 @@ def _sizes(naming: Naming, size: FloatArray, unit: str, steps: Steps) -> list[fi
     )
     sides = _bars(fig.faint(fig.BEFORE, 0.6), high - middle, middle - low, thickness=1.2)
     without = say.dates(*steps.middle[steps.count(naming.time_s[~naming.named]) > 0])
-    grey, dot = {"color": fig.NOISE, "size": 4}, {"color": fig.BEFORE, "size": 6}
     return [
-        fig.points(say.dates(*steps.middle[weeks]), fig.numbers(middle), "named", marker=dot, error_y=sides,
+        fig.points(say.dates(*steps.middle[weeks]), middle, "named", fig.BEFORE, 6, error_y=sides,
                hovertemplate=f"%{{y:.4g}} {unit}"),
-        fig.points(without, [0.0] * len(without), "not named", marker=grey, hovertemplate="not named"),
+        fig.points(without, [0.0] * len(without), "not named", fig.NOISE, 4, hovertemplate="not named"),
     ]  # fmt: skip
 
 
@@ -156,12 +155,11 @@ def _weeks(bins: Binned, trend: Trend, steps: Steps, factor: float, unit: str) -
     bottom = say.dates(*steps.middle[none])
     return [
         fig.points(
-            places, fig.numbers(bins.value[some] * factor), steps.name,
-            marker={"color": fig.MEASURED, "size": 5}, error_y=sides,
+            places, bins.value[some] * factor, steps.name, fig.MEASURED, 5, error_y=sides,
             customdata=np.column_stack([bins.identifiable[some], bins.recorded[some]]).astype(int).tolist(),
             hovertemplate=f"%{{y:.7g}} {unit}, %{{customdata[0]}} of %{{customdata[1]}} recordings",
         ),
-        fig.points(bottom, [0.02] * len(bottom), "could not be determined", **missing),
+        fig.points(bottom, [0.02] * len(bottom), "could not be determined", fig.NOISE, 7, **missing),
     ]  # fmt: skip
 
 

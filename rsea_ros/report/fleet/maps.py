@@ -92,13 +92,10 @@ def _map(
 
 def _row(trend: Trend | None, steps: Steps) -> tuple[FloatArray, BoolArray]:
     """Return the relative change of each week, and which weeks were recorded and not determined."""
-    empty = np.full(len(steps), np.nan)
     if trend is None:
-        return empty, np.zeros(len(steps), bool)
-    bins = bin_days(trend, steps)
-    if trend.first is None or not trend.first.value:
-        return empty, bins.recorded > 0
-    change: FloatArray = (bins.value - trend.first.value) / abs(trend.first.value)
+        return np.full(len(steps), np.nan), np.zeros(len(steps), bool)
+    bins, level = bin_days(trend, steps), trend.first.value if trend.first else math.nan
+    change: FloatArray = (bins.value - level) / (abs(level) or math.nan)
     return change, (bins.recorded > 0) & ~np.isfinite(change)
 
 
@@ -110,8 +107,8 @@ def timeline(alarms: Sequence[Alarm], steps: Steps) -> list[fig.Figure]:
     for k, a in enumerate(shown):
         tone, began = _TONES.get(a.kind, fig.BEFORE), f"began {say.doubt_of_date(a)}<extra></extra>"
         for ends, colour in (((a.earliest_s, a.latest_s), fig.faint(tone, 0.35)), ((a.since_s, last), tone)):
-            bar: fig.Json = {"mode": "lines", "line": {"color": colour, "width": 9}, "hovertemplate": began}
-            data.append(fig.points(say.dates(*np.clip(ends, first, last)), [k, k], "", **bar))
+            x = say.dates(*np.clip(ends, first, last))
+            data.append(fig.line(x, np.full(2, k), "", colour, 9, hovertemplate=began))
         about = f"<b>{escape(a.joint)}</b> {escape(say.about(a))}"
         names.append(fig.label(about, 0.0, k, fig.INK, xref="paper", yanchor="bottom", yshift=5))
     drawing = fig.layout(
