@@ -41,7 +41,7 @@ def test_diagnose_tells_of_a_command_that_never_changes(tmp_path, capsys):
     held = rsea.simulate(RIG, np.full(1680, 7.0), 280.0, seed=4)
     write_record(held, tmp_path / "bag.mcap")
     assert main(["diagnose", str(tmp_path / "bag.mcap"), "--out", str(tmp_path / "out")]) == 0
-    assert "red: excitation commanded motor torque: 7.00 N·m the command never changes" in (
+    assert "red: excitation commanded motor torque: 7.00 N·m, the command never changes" in (
         " ".join(capsys.readouterr().out.split())
     )
 
