@@ -5,7 +5,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from rsea_ros.diagnosis.result import Alternative, Cause, Diagnosis, Experiment, Misfit, Rejected
+from rsea_ros.diagnosis.result import Alternative, Cause, Diagnosis, Experiment, Rejected
 from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings
 from rsea_ros.documents.wording import list_names
 from rsea_ros.identification.result import Overlay
@@ -222,7 +222,7 @@ def overlay_records(diagnosis: Diagnosis, record: Record) -> Mapping[str, Record
 def diagnosis_json(diagnosis: Diagnosis) -> dict[str, Any]:
     """Return the contents of diagnosis.json; infinite numbers and NaN are null."""
     d, numbers = diagnosis, {s.name: outputs.strict(s.value) for s in diagnosis.settings.numbers()}
-    following = d.next_experiment
+    following, misfit = d.next_experiment, "what from=low to=high unit times_noise channel"
     stuck = {name for r in d.remarks if r.code == "at_bound" for name in r.names}
     others = [
         {**pick(a, "name instead_of probability channel"), "parameters": _sizes(a),
@@ -239,7 +239,7 @@ def diagnosis_json(diagnosis: Diagnosis) -> dict[str, Any]:
                  "faults": [outputs.fault_json(f) for f in d.faults]},
         "baseline": {"parameters": parameters_json(d.baseline),
                      **pick(d, "residual_rms noise_rms fit_percent")},
-        "misfit": _misfits(d.misfit),
+        "misfit": [pick(m, misfit) for m in d.misfit],
         "causes": [
             {**_cause_json(c), "alternatives": [a for a in others if a["instead_of"] == c.name]}
             for c in d.causes
@@ -253,7 +253,7 @@ def diagnosis_json(diagnosis: Diagnosis) -> dict[str, Any]:
         "extended": {
             "parameters": parameters_json(d.final),
             **pick(d, "residual_rms=extended_residual_rms fit_percent=extended_fit_percent at_noise_floor"),
-            "misfit": _misfits(d.remaining),
+            "misfit": [pick(m, misfit) for m in d.remaining],
         },
         "nuisance": [
             {**pick(p, "name value unit stated=start spreads_off"), "at_bound": p.name in stuck}
@@ -266,10 +266,6 @@ def diagnosis_json(diagnosis: Diagnosis) -> dict[str, Any]:
         "settings": {**pick(d.settings, "max_causes without"), **numbers},
         "noise_numbers": {name: v for name, v in numbers.items() if name.startswith("noise.")},
     }  # fmt: skip
-
-
-def _misfits(misfits: Sequence[Misfit]) -> list[dict[str, Any]]:
-    return [pick(m, "what from=low to=high unit times_noise channel") for m in misfits]
 
 
 def _cause_json(cause: Cause) -> dict[str, Any]:

@@ -191,7 +191,7 @@ def _label(change: Change, trend: Trend) -> fig.Json:
     text = f"{say.percent(share)}, " if np.isfinite(share) else ""
     x: Any = say.dates(change.since_s)[0]
     at: fig.Json = {"yref": "paper", "yanchor": "bottom", "xanchor": "center"}
-    return fig.label(f"{text}{say.short_day(change.since_s)}", x, 1.0, fig.BEFORE, **at)
+    return fig.label(f"{text}{say.day(change.since_s, short=True)}", x, 1.0, fig.BEFORE, **at)
 
 
 def _caption(trend: Trend) -> str:

@@ -254,7 +254,7 @@ def recording_table(recordings: Table, rows: np.ndarray, links: Links) -> html.H
     return html.Html(html.paragraph(_NO_PAGE if lacking else "") + html.listed(
         latest,
         ("Recording", lambda i: links.recording(text("recording", i), text("artefacts", i))),
-        ("Date", lambda i: say.short_day(time_s[i]) if np.isfinite(time_s[i]) else "unknown"),
+        ("Date", lambda i: say.day(time_s[i], short=True) if np.isfinite(time_s[i]) else "unknown"),
         ("Outcome", lambda i: text("outcome", i)),
         ("Verdict", lambda i: text("verdict", i).replace("_", " ")),
         ("Causes", lambda i: names("causes", "name", i)),

@@ -122,6 +122,6 @@ def timeline(alarms: Sequence[Alarm], steps: Steps) -> list[fig.Figure]:
         "recording if that shows it. Orange: it continues, or has a name. Blue: the change is over, its "
         f"level stays. Grey: bad data.{more}"
     )
-    earliest = say.short_day(min((a.since_s for a in shown), default=0.0))
+    earliest = say.day(min((a.since_s for a in shown), default=0.0), short=True)
     title = f"What changed since when: {number}, the earliest of {earliest}"
     return [fig.Figure(title, caption, data, drawing, 60 + _SINCE * len(shown))] if shown else []

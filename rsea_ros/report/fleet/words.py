@@ -24,15 +24,10 @@ _MOST = 3
 """Changes that a title names."""
 
 
-def day(time_s: float, month: str = "%B") -> str:
-    """Return a date as `24 March 2025`. month: its form, of strftime."""
+def day(time_s: float, *, short: bool = False) -> str:
+    """Return a date as `24 March 2025`, or short as `24 Mar 2025`."""
     t = datetime.fromtimestamp(time_s, timezone.utc)
-    return f"{t.day} {t.strftime(month)} {t.year}"
-
-
-def short_day(time_s: float) -> str:
-    """Return a date as `24 Mar 2025`."""
-    return day(time_s, "%b")
+    return f"{t.day} {t.strftime('%b' if short else '%B')} {t.year}"
 
 
 def dates(*time_s: float) -> list[str]:
@@ -138,8 +133,8 @@ def doubt_of_date(alarm: Alarm) -> str:
     if not math.isfinite(alarm.since_s):
         return ""
     if alarm.from_first:
-        return f"before {short_day(alarm.since_s)}"
-    first, last = short_day(alarm.earliest_s).split(), short_day(alarm.latest_s).split()
+        return f"before {day(alarm.since_s, short=True)}"
+    first, last = day(alarm.earliest_s, short=True).split(), day(alarm.latest_s, short=True).split()
     while first and first[-1] == last[len(first) - 1]:
         first.pop()
     return f"{' '.join(first)} to {' '.join(last)}" if first else " ".join(last)
@@ -170,7 +165,7 @@ def _finding(trend: Trend) -> str:
         return f"{subject(about)} is steady: no step above {least}{share}"
     if trend.state == "trending" and trend.per_year is not None:
         way, limit = "rising" if trend.per_year.value > 0.0 else "falling", trend.to_limit_s
-        first, last = (short_day(t) for t in limit[1:]) if limit else ("", "")
+        first, last = (day(t, short=True) for t in limit[1:]) if limit else ("", "")
         end = f", at its limit about {day(limit.value)} ({first} to {last})" if limit else ""
         return f"{subject(about)} is {way}: {percent(trend.relative)} since the first day{end}"
     return f"{subject(about)} {list_names([_movement_text(c, trend) for c in trend.changes[:_MOST]])}"
