@@ -14,7 +14,10 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import nullcontext
 from datetime import datetime, timezone
+from itertools import takewhile
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -58,20 +61,27 @@ def append_line(path: Path, entry: Mapping[str, Any]) -> None:
 
 
 def resumed(
-    log: Path, works: Iterable[tuple[Any, Callable[[], Mapping[str, Any]]]], key: str,
-    minutes: float = math.inf,
+    log: Path | None, works: Iterable[tuple[Any, Callable[[], Mapping[str, Any]]]], key: str,
+    minutes: float = math.inf, jobs: int = 1,
 ) -> Iterator[Mapping[str, Any]]:  # fmt: skip
     """Do the works that a log lacks, and append their entries; yield each.
 
     works: what the entry has under `key`, and what makes the entry. minutes: none is begun after that.
+    jobs: processes; with several, all works are begun.
     """
     stop = time.monotonic() + 60.0 * minutes
-    done = {entry.get(key) for entry in read_lines(log)}
-    for name, work in works:
-        if name not in done and time.monotonic() < stop:
-            entry = work()
-            append_line(log, entry)
+    done = {entry.get(key) for entry in (read_lines(log) if log else ())}
+    left = (work for name, work in works if name not in done)
+    with ProcessPoolExecutor(jobs) if jobs > 1 else nullcontext() as pool:
+        begun = takewhile(lambda _: time.monotonic() < stop, left)
+        for entry in pool.map(_done, left) if pool else map(_done, begun):
+            if log:
+                append_line(log, entry)
             yield entry
+
+
+def _done(work: Callable[[], Mapping[str, Any]]) -> Mapping[str, Any]:
+    return work()
 
 
 def add_run(topic: str, section: str, tables: Sequence[Sequence[Row]], seconds: float) -> None:

@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
 import importlib
-import itertools
 import json
 import math
 import time
 import traceback
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from bench.results import append_line, read_lines
+from bench.results import resumed
 from rsea_ros.diagnosis.result import CauseParameter, Diagnosis
 from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings
 from rsea_ros.errors import RseaError
@@ -89,20 +86,13 @@ def play_all(
 
     minutes: none is begun after that. jobs: processes.
     """
-    done = {line["record"] for line in (read_lines(log) if log else ())}
-    left = [entry for entry in entries if entry.name not in done]
-    stop = time.monotonic() + 60.0 * minutes
-    with ProcessPoolExecutor(jobs) if jobs > 1 else contextlib.nullcontext() as pool:
-        begun = itertools.takewhile(lambda _: time.monotonic() < stop, left)
-        ask = partial(play_entry, settings=settings)
-        for line in pool.map(ask, left) if pool else map(ask, begun):
-            if log:
-                append_line(log, line)
-            found = line.get("found", ())
-            sizes = ", ".join(f"{name} {value:.4g} of {truth:.4g}" for _, name, truth, value, *_ in found)
-            mark = "" if line["truth"] is None else "ok   " if is_right(line) else "not  "
-            sizes = f" ({sizes})" if sizes else ""
-            yield f"{mark}{line['record']}: {said(line)}{sizes}, {line['seconds']:.1f} s"
+    works = ((entry.name, partial(play_entry, entry, settings)) for entry in entries)
+    for line in resumed(log, works, "record", minutes, jobs):
+        found = line.get("found", ())
+        sizes = ", ".join(f"{name} {value:.4g} of {truth:.4g}" for _, name, truth, value, *_ in found)
+        mark = "" if line["truth"] is None else "ok   " if is_right(line) else "not  "
+        sizes = f" ({sizes})" if sizes else ""
+        yield f"{mark}{line['record']}: {said(line)}{sizes}, {line['seconds']:.1f} s"
 
 
 def _told(result: Diagnosis) -> dict[str, Any]:
