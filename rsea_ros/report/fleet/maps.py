@@ -84,7 +84,7 @@ def _map(
     place: fig.Json = {"type": "heatmap", "x": say.dates(*steps.middle), "y": names, "xgap": 1, "ygap": 2,
                        "hovertemplate": _HOVER.format("%{z:.1%}")}  # fmt: skip
     data = [{**place, **layer, "z": [fig.numbers(row) for row in layer["z"]]} for layer in layers]
-    rows = fig.axis(autorange="reversed", ticks="", showgrid=False, dtick=1)
+    rows = fig.axis(type="category", autorange="reversed", ticks="", showgrid=False, dtick=1)
     margin = {"l": 24, "r": 24, "t": 12, "b": 48}
     drawing = fig.layout(xaxis=date_axis(steps), yaxis=rows, hovermode="closest", margin=margin)
     return fig.Figure(title, caption, data, drawing, _AROUND + _ROW * max(3, len(joints)))
