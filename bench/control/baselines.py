@@ -19,11 +19,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import partial
-from multiprocessing import get_context
-from typing import Any
 
 import numpy as np
 from scipy.optimize import minimize
@@ -209,7 +206,8 @@ def baselines(rig: Rig, free: Rig, rates: Sequence[float]) -> Iterator[Row | str
     loads = load_range(rig, free)
     for rate in rates:
         made: dict[str, Callable[[], Step]] = {}
-        for name, x in zip(METHODS, _all_tuned(rig, loads, rate), strict=True):
+        for name in METHODS:
+            x = tune(name, rig, loads, rate)
             yield f"{rate:g} Hz, {name}: {', '.join(f'{value:.3g}' for value in x) or 'no gains'}"
             made[name] = partial(METHODS[name][0], rig, 1.0 / rate, x)
         made["this project's"] = partial(ours, rig, rate, design(rig, loads, rate).gains)
@@ -220,17 +218,3 @@ def baselines(rig: Rig, free: Rig, rates: Sequence[float]) -> Iterator[Row | str
                 error = error_of(begin(), disturbed_rig(loads, case), rate, amplitude, case.samples)
                 cells[where] = f"{100.0 * error:.1f}" if error < UNSTABLE else "unstable"
             yield Row(name, "", cells)
-
-
-_searched: dict[str, Any] = {}
-"""rig, loads and rate of the search: processes inherit them, since a rig cannot be pickled."""
-
-
-def _all_tuned(rig: Rig, loads: Mapping[str, Rig], rate: float) -> list[Values]:
-    _searched.update(rig=rig, loads=loads, rate=rate)
-    with ProcessPoolExecutor(2, get_context("fork")) as pool:
-        return list(pool.map(_tune, METHODS))
-
-
-def _tune(name: str) -> Values:
-    return tune(name, **_searched)

@@ -43,26 +43,24 @@ def damage_bytes(rng: random.Random, data: bytes, other: bytes = b"") -> bytes:
 
 
 def _damage_once(rng: random.Random, data: bytes, other: bytes) -> bytes:
-    at, kind = rng.randrange(len(data)), rng.randrange(12)
-    head, size = data[:at], rng.choice((1, 4, 16, 256, 4096))
-    if kind < 2:
-        return head + bytes((data[at] ^ 1 << rng.randrange(8),)) + data[at + 1 :]
-    if kind < 3:
-        return head + bytes((rng.choice((0, 1, 0x7F, 0x80, 0xFF, rng.randrange(256))),)) + data[at + 1 :]
-    if kind < 6:
-        put = _odd_number(rng)
-        return head + put + data[at + len(put) :]
-    if kind < 7:
-        return head
-    if kind < 8:
-        return head + data[at + rng.choice((1, 2, 4, 8, 64, 512)) :]
-    if kind < 9:
-        return head + rng.randbytes(rng.choice((1, 2, 4, 8, 64))) + data[at:]
-    if kind < 10:
-        return data[: at + size] + data[at : at + size] * rng.choice((1, 1, 3, 50)) + data[at + size :]
-    if kind < 11:
-        return head + bytes((rng.choice((0, 0xFF)),)) * min(size, len(data) - at) + data[at + size :]
-    return head + other[rng.randrange(len(other)) :]
+    """Return bytes with a bit, a byte or a number changed, cut off, or with a part left out, put in, doubled,
+    blanked or of another file."""
+    at, size = rng.randrange(len(data)), rng.choice((1, 4, 16, 256, 4096))
+    head, tail, put = data[:at], data[at:], _odd_number(rng)
+    byte, blank = rng.choice((0, 1, 0x7F, 0x80, 0xFF, rng.randrange(256))), rng.choice((b"\0", b"\xff"))
+    changed = (
+        (2, bytes((tail[0] ^ 1 << rng.randrange(8),)) + tail[1:]),
+        (1, bytes((byte,)) + tail[1:]),
+        (3, put + tail[len(put) :]),
+        (1, b""),
+        (1, tail[rng.choice((1, 2, 4, 8, 64, 512)) :]),
+        (1, rng.randbytes(rng.choice((1, 2, 4, 8, 64))) + tail),
+        (1, tail[:size] * rng.choice((2, 2, 4, 51)) + tail[size:]),
+        (1, blank * min(size, len(tail)) + tail[size:]),
+        (1, other[rng.randrange(len(other)) :]),
+    )
+    shares, parts = zip(*changed, strict=True)
+    return head + bytes(rng.choices(parts, shares)[0])
 
 
 def _odd_number(rng: random.Random) -> bytes:
