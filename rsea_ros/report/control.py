@@ -47,12 +47,8 @@ def control_report(study: Study, provenance: Provenance | None = None) -> str:
 
 def verdict(study: Study) -> str:
     """Return the verdict in a sentence."""
-    missed = [
-        f"{typeset(t.what)} at {at.design.rate:g} Hz"
-        for at in study.rates
-        for t in at.trials
-        if t.met is False
-    ]
+    every = [(at.design.rate, trial) for at in study.rates for trial in at.trials]
+    missed = [f"{typeset(trial.what)} at {rate:g} Hz" for rate, trial in every if trial.met is False]
     reached = f"Stable on all {study.rates[0].swept.cases} benches of the set, from locked to free"
     if any(at.swept.unstable for at in study.rates):
         reached = "Unstable on part of the set"

@@ -140,9 +140,8 @@ def _experiment(experiment: Experiment) -> html.Html:
     given, settings = experiment.excitation, words.sentence(say.excitation(experiment.excitation))
     options = " ".join(f"-p {k}:={given[k]}" for k in _EXCITE if k in given)
     play = html.Html(f"<p class='under'>{html.code(f'ros2 run rsea_ros excite --ros-args {options}')}</p>")
-    playable = (
-        "kind" in given and given.get("unit") == UNITS["command"]
-    )  # excite plays torques, not positions
+    # excite plays torques, not positions
+    playable = "kind" in given and given.get("unit") == UNITS["command"]
     return html.section(
         "The run that would decide" if given else "What would decide",
         say.prose(say.next_run(experiment)),
@@ -211,9 +210,8 @@ def overlay_records(diagnosis: Diagnosis, record: Record) -> Mapping[str, Record
     """
 
     def simulated(overlays: Sequence[Overlay]) -> Record:
-        return Record(
-            {o.channel: Channel(o.t, o.simulated) for o in overlays}, record.source, record.epoch_ns
-        )
+        channels = {o.channel: Channel(o.t, o.simulated) for o in overlays}
+        return Record(channels, record.source, record.epoch_ns)
 
     records = (record, simulated(diagnosis.before), simulated(diagnosis.after))
     return dict(zip(NAMESPACES, records, strict=True))

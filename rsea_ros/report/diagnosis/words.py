@@ -7,17 +7,8 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 from rich.text import Text
 
-from rsea_ros.diagnosis.result import (
-    Alternative,
-    Cause,
-    CauseParameter,
-    Diagnosis,
-    Edit,
-    Experiment,
-    Misfit,
-    Reason,
-    Rejected,
-)
+from rsea_ros.diagnosis import result as results
+from rsea_ros.diagnosis.result import Alternative, Cause, Diagnosis, Experiment, Rejected
 from rsea_ros.documents.units import in_motion
 from rsea_ros.documents.wording import list_names
 from rsea_ros.effects.catalogue import catalogue, effect_named
@@ -27,7 +18,7 @@ from rsea_ros.report import remark_words as remarks, words
 from rsea_ros.report.figures.spectrum import peak_above
 from rsea_ros.report.words import LABEL, WIDTH, command_row, row, wrap
 
-_REASONS: Mapping[Reason, str] = {
+_REASONS: Mapping[results.Reason, str] = {
     "far_behind": "much worse than the best effect on the training data",
     "at_bound": "its fitted size is at the bound of the effect, or within a clock's error of nothing",
     "not_sure": "does not certainly lower the residual of held-out data",
@@ -272,7 +263,7 @@ def residual_change(diagnosis: Diagnosis, channel: str) -> str:
     return f"{before} → {after}" if diagnosis.causes else before
 
 
-def sizes(cause: Cause) -> dict[str, CauseParameter]:
+def sizes(cause: Cause) -> dict[str, results.CauseParameter]:
     """Return the parameters that say how large a cause is.
 
     One that would be infinite is left out: a drift that is a straight line has no time constant.
@@ -317,11 +308,10 @@ def inspection(name: str) -> str:
     return effect_named(name).inspect if name in catalogue() else ""
 
 
-def edit_sentence(e: Edit) -> str:
+def edit_sentence(e: results.Edit) -> str:
     """Return what a run of the edited machine says of a name."""
-    after, before, dense, own = (
-        words.number(v / e.noise, 3) for v in (e.error_after, e.error_before, e.error_dense_fit, e.own_error)
-    )
+    errors = (e.error_after, e.error_before, e.error_dense_fit, e.own_error)
+    after, before, dense, own = (words.times(error / e.noise) for error in errors)
     verdict = "survives" if e.survived else "does not survive"
     return (
         f"{words.effect(e.cause)} {verdict} its removal: deleted from the model and nothing fitted, the "
@@ -349,7 +339,7 @@ def _rows(d: Diagnosis, unclear: Sequence[str]) -> Iterator[tuple[str, str]]:
     if d.edit is not None:
         yield "edited", edit_sentence(d.edit)
     if d.misfit and d.verdict != "nothing_wrong":
-        worst: dict[str, Misfit] = {}  # in each respect
+        worst: dict[str, results.Misfit] = {}  # in each respect
         for m in sorted(d.misfit, key=lambda m: -m.times_noise):
             worst.setdefault(m.what, m)
         where = [
