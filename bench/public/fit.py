@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from scipy.optimize import least_squares
 
 from bench import SHARED
 from rsea_ros.identification.fit import unknowns_of
@@ -92,21 +93,14 @@ def error_of(
 
 
 def _initial(rig: Rig, drive: Drive, measured: FloatArray) -> tuple[float, float]:
-    """Return the position and velocity that fit the first samples best, by Gauss-Newton."""
+    """Return the position and velocity that fit the first samples best."""
     steps = int(drive.at["position"][len(measured)])
-    short = replace(
-        drive,
-        command=drive.command[:steps],
-        at={"position": drive.at["position"][: len(measured)]},
-    )
+    at = {"position": drive.at["position"][: len(measured)]}
+    short = replace(drive, command=drive.command[:steps], at=at)
     speed = np.ptp(measured) / max(drive.step * steps, 1e-9)
-    state, scale = np.array([measured[0], 0.0]), np.array([1e-3 * np.ptp(measured), 1e-3 * speed])
 
-    def simulate_run(at: FloatArray) -> FloatArray:
-        return simulate_drive(rig, replace(short, initial=(float(at[0]), float(at[1]))))["position"]
+    def misfit(state: FloatArray) -> FloatArray:
+        return simulate_drive(rig, replace(short, initial=tuple(state)))["position"] - measured
 
-    for _ in range(6):
-        now = simulate_run(state)
-        slope = np.column_stack([(simulate_run(state + s) - now) / s.sum() for s in np.diag(scale)])
-        state = state - np.linalg.lstsq(slope, now - measured, rcond=None)[0]
-    return float(state[0]), float(state[1])
+    found = least_squares(misfit, [measured[0], 0.0], x_scale=[np.ptp(measured), speed], diff_step=1e-3)
+    return float(found.x[0]), float(found.x[1])
