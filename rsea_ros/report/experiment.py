@@ -86,7 +86,8 @@ def _advice(advice: Advice) -> Iterator[Block]:
         yield command_figure(p)
         yield spectrum_figure([("run", p)])
         yield _demands(p, advice.asked.limits)
-    yield from _proofs(advice.proofs)
+    if advice.proofs:
+        yield section("Not separable by any run", bullets(map(proof_words, advice.proofs)))
 
 
 def _separations(p: Proposal) -> Html:
@@ -110,10 +111,6 @@ def _demands(p: Proposal, limits: RunLimits) -> Html:
         ("quantity", "#expected", "#at level", "#limit", "unit"), limit_rows(p, limits.finite_limits())
     )
     return section("Demands on the bench", rows, caption=f"At level: {LEVEL_WORDS}.")
-
-
-def _proofs(proofs: Sequence[Proof]) -> list[Html]:
-    return [section("Not separable by any run", bullets(map(proof_words, proofs)))] if proofs else []
 
 
 def command_figure(p: Proposal) -> fig.Figure:
@@ -168,7 +165,8 @@ def _session(outcome: CampaignOutcome, limits: RunLimits) -> Iterator[Block]:
         yield spectrum_figure([(f"run {k}", p) for k, p in played])
         yield from (command_figure(p) for _, p in played)
         yield _demands(played[-1][1], limits)
-    yield from _proofs(outcome.proofs)
+    if outcome.proofs:
+        yield section("Not separable by any run", bullets(map(proof_words, outcome.proofs)))
 
 
 def probability_figure(outcome: CampaignOutcome) -> fig.Figure:

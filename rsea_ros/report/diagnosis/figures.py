@@ -23,9 +23,6 @@ from rsea_ros.report.figures.overlay import overlay_figure
 from rsea_ros.report.figures.spectrum import finding, in_bands, peak_above, residual_figure
 from rsea_ros.report.page import Html
 
-_FIRST_VIEW = 3.0
-"""s of the record that the figure over time opens with."""
-
 
 def spectrum_figure(diagnosis: Diagnosis, spectrum: Spectrum) -> Figure:
     """Return the residual's density before and after against the noise floor, the improvement shaded."""
@@ -65,7 +62,7 @@ def time_figure(diagnosis: Diagnosis, channel: str) -> Figure:
     title = f"{name} over time: {fit} → {d.extended_fit_percent[channel]:.2f} % explained"
     both = [Curve("before", BEFORE, before.simulated), Curve("after", AFTER, after.simulated)]
     apart = before.simulated - after.simulated
-    return overlay_figure(title, *named, before.t, before.measured, both, _FIRST_VIEW, apart)
+    return overlay_figure(title, *named, before.t, before.measured, both, view=3.0, lively=apart)
 
 
 _PARTS = ("command", "motor", "gear", "encoder", "spring", "F/T sensor", "support")

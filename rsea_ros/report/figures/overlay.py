@@ -18,7 +18,6 @@ _MEASURED, _RESIDUAL = 1.0 / 2000.0, 1.0 / 64.0
 _MICROSECOND = 1e-6
 STEPS = 60_000
 """Of the whole range of a packed trace, at the least: 16 bits hold them."""
-_LEVEL = 6
 _PAUSE, _PERIODS = 1.0, 10.0
 """s, and sample periods: a longer pause of the samples shows as a gap of the line."""
 
@@ -131,5 +130,5 @@ def pack(values: FloatArray, step: float = 0.0) -> dict[str, Any]:
     step = max(step, (high - low) / STEPS) or 1.0
     whole = np.where(known, np.round((off - low) / step), 2.0**16 - 1.0).astype("<u2")
     planes = np.concatenate([whole & 0xFF, whole >> 8]).astype(np.uint8)
-    data = base64.b64encode(gzip.compress(planes.tobytes(), _LEVEL, mtime=0)).decode("ascii")
+    data = base64.b64encode(gzip.compress(planes.tobytes(), 6, mtime=0)).decode("ascii")
     return {"first": first + low, "slope": slope, "step": step, "data": data}
