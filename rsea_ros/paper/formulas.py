@@ -39,13 +39,6 @@ def eq_3_lumped_distal_per_proximal(k_s: float, j_eff: float, b_s: float) -> Tra
     return _over([k_s], [j_eff, b_s, k_s])
 
 
-def eq_4_distal_per_motor(
-    k_s: float, j_rotor: float, b_rotor: float, ratio: float, j_sc: float, b_s: float
-) -> TransferFunction:
-    """Return T_d / T_m = K_s / ((J_rotor N^2 + J_sc) s^2 + (b_rotor N^2 + b_s) s + K_s). Paper, Eq. (4)."""
-    return eq_1_lumped_distal_per_motor(k_s, j_rotor * ratio**2 + j_sc, b_rotor * ratio**2 + b_s)
-
-
 def eq_5_proximal_per_motor(
     k_s: float, j_rotor: float, b_rotor: float, ratio: float, j_sc: float, b_s: float
 ) -> TransferFunction:
