@@ -109,7 +109,7 @@ class Polarity:
             return self.contradiction
         rest = None if heard is None else self._made[0] - sum(heard)
         if name := self._change.take(reading, rest, missed):
-            self._contradict(self._changed(name))
+            self._contradict(self._unless_frozen(f"{name} has changed its sign"))
         if heard is None or self.contradiction:
             return self.contradiction
         ft, motion = heard
@@ -123,13 +123,14 @@ class Polarity:
         allowed = SUDDEN * self._pulse + 2.0 * self._friction + DOUBT * abs(motion) + 4.0 * self._seen.noise
         self._off = self._off + 1 if off > allowed and flipped[name] < EXPLAINED * off else 0
         self._friction += self._h / LONG * (min(off, allowed) - self._friction)
-        if self._off >= CYCLES:
-            self._contradict(self._changed(name))
+        if self._off >= CYCLES:  # two samples do not tell a sign from a gain
+            made = f"motor torque is {self._made[0]:.3g} N·m, ft {ft:.3g}, J w' + b w {motion:.3g}"
+            self._contradict(self._unless_frozen(f"{made}, as with another gain or with {name} reversed"))
         return self.contradiction
 
-    def _changed(self, name: str) -> str:
-        """Return in words what changed; a signal that stands still beside one that moves looks so, too."""
-        return f"{name} has changed its sign" if self._alike < CYCLES else "joint_states repeat one value"
+    def _unless_frozen(self, words: str) -> str:
+        """Return words on what changed; a signal that stands still beside one that moves looks so, too."""
+        return words if self._alike < CYCLES else "joint_states repeat one value"
 
     def _outside(self, torque: float) -> float:
         """Return by how much a torque is outside of what the motor made over the last SENT samples, N m.

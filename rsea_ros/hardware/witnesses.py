@@ -5,7 +5,8 @@
 
 All signals pass one low-pass and one window of equal weights. Then means of sums add up: one that differs is
 a zero point or a gain; and standard deviations do not depend on delays: one that differs is a gain. Friction
-moves a mean only by how much more the gear goes one way than the other (decision 314).
+moves a mean only by how much more the gear goes one way than the other. That is told; what spring and motor
+together contradict gravely is a fault at once (decision 314).
 """
 
 import math
@@ -22,6 +23,9 @@ PAUSE, LASTING = 0.1, 0.5
 """s without torque that are a rest; s that a window has at least, and for which a contradiction lasts."""
 UNEVEN = 0.5
 """Part of a deviation that a law which is not the same either way may make a mean of."""
+GRAVE, CYCLES, SIDED, DELAY = 2.5, 2, 0.5, 0.01
+"""Times its doubts by which the spring contradicts ft gravely; readings running that are a fault; part of that
+by which the motor may be off the spring that it sides with; s of delay between ft and spring."""
 LOST = 4.0
 """Periods from one reading to the next, from which on the momentum between them is not known."""
 
@@ -32,8 +36,7 @@ class Actuator:
 
     by_angle: whether the gear's angle is the spring's deflection, where that is not measured. bent, driven,
     risen, dragged: doubts, parts of the torques of spring and motor, of J w' and b w. play, friction: N m.
-    grave: N m of difference from which on a contradiction of both is a fault. creep: rad/s, below which the
-    way is not known.
+    creep: rad/s, below which the way is not known.
     """
 
     damping: float
@@ -46,7 +49,6 @@ class Actuator:
     dragged: float
     play: float
     friction: float
-    grave: float
     creep: float
 
 
@@ -88,7 +90,7 @@ class Witnesses:
 
     def _begin(self) -> None:
         """Begin anew."""
-        self.words, self._off, self._both = "", 0, 0
+        self.words, self._off, self._grave = "", 0, 0
         self._low: Signals | None = None
         self._rest, self._work = Window(), Window()
 
@@ -108,7 +110,9 @@ class Witnesses:
         if self._idle * self._period <= PAUSE:
             self._rest, self._known = Window(), self._zero
             self._work = self._followed(self._work, self._low)
-            return self._judge(self._work) if self._work.readings * self._period >= LASTING else None
+            if self._work.readings * self._period >= LASTING:
+                self._judge(self._work)
+            return self._gravely(self._low, signals)
         self._rest = self._followed(self._rest, self._low)
         if self._rest.readings * self._period >= LASTING:
             zero = self._rest.mean.ft - self._rest.mean.spring
@@ -130,13 +134,28 @@ class Witnesses:
             way=math.copysign(abs(state.velocity) > rig.creep, state.velocity),
         )
 
+    def _gravely(self, low: Signals, now: Signals) -> DeviceFault | None:
+        """Return the fault of an ft that the spring contradicts gravely, and the motor sides with the spring.
+
+        now: what is ahead of the low-pass, which tells what a delay can make of it.
+        """
+        late, hasty = (DELAY / SMOOTH * abs(x - y) for x, y in ((now.spring, low.spring), (now.motor, low.motor)))
+        bend = low.spring + self._zero
+        off, least = abs(low.ft - bend), min(abs(low.ft), abs(bend)) if low.ft * bend > 0.0 else 0.0
+        most = GRAVE * max(self._rig.bent * least, self._rig.play)
+        sided = abs(bend - low.motor) + hasty < SIDED * off
+        self._grave = self._grave + 1 if sided and off - late > most else 0
+        if self._grave < CYCLES:
+            return None
+        return DeviceFault("ft", off, most, "N m", f"off: {self._told(low)}")
+
     def _followed(self, window: Window, low: Signals) -> Window:
         part = min(max(1.0 / (window.readings + 1), self._period / MEMORY), 1.0)
         squares = Signals(*(x * x for x in low))
         mean, square = _nearer(window.mean, low, part), _nearer(window.square, squares, part)
         return Window(window.readings + 1, mean, square)
 
-    def _judge(self, window: Window) -> DeviceFault | None:
+    def _judge(self, window: Window) -> None:
         """Compare means, and standard deviations."""
         mean = window.mean
         swing = Signals(*(math.sqrt(max(q - m * m, 0.0)) for q, m in zip(window.square, mean, strict=True)))
@@ -147,18 +166,18 @@ class Witnesses:
         moving = self._parts(swing, swing, 1.0)
         motor, spring = map(max, zip(still, moving, strict=True))
         x, of = (zeroed, "") if max(still) > max(moving) else (swing, " RMS")
-        off = abs(x.ft - x.motor)
         self._off = self._off + 1 if max(motor, spring) > 1.0 else 0
-        self._both = self._both + 1 if min(motor, spring) > 1.0 and off > self._rig.grave else 0
+        told = self._told(x if of else x._replace(spring=mean.spring), of)
+        lasts = self._off * self._period > LASTING
+        self.words = f"{told} contradict each other, expected them alike" if lasts else ""
+
+    def _told(self, x: Signals, of: str = "") -> str:
+        """Return the torques in words. of: what of them, " RMS"."""
         told = f"ft {x.ft:.3g}, motor torque less momentum {x.motor:.3g}"
         if not math.isnan(x.spring):
-            told += f", K times deflection {x.spring if of else mean.spring:.3g}"
+            told += f", K times deflection {x.spring:.3g}"
             told += f" (ft is {self._zero:.3g} at rest)" if abs(self._zero) > self._rig.play else ""
-        lasts = self._off * self._period > LASTING
-        self.words = f"{told} N·m{of} contradict each other, expected them alike" if lasts else ""
-        if self._both * self._period <= LASTING:
-            return None
-        return DeviceFault("ft", off, self._rig.grave, "N m", f"off: {told} N·m{of}")
+        return f"{told} N·m{of}"
 
     def _parts(self, x: Signals, sizes: Signals, one_way: float) -> tuple[float, float]:
         """Return what motor and spring contradict ft by, as parts of what is allowed.

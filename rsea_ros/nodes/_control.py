@@ -3,15 +3,23 @@
 from collections.abc import Mapping
 from typing import Any
 
-from rsea_ros.control.controller import CORNER, ControllerSettings, TorqueController, TorqueLimits
+from rsea_ros.control.controller import (
+    CORNER,
+    ControllerSettings,
+    Measurement,
+    TorqueController,
+    TorqueLimits,
+)
 from rsea_ros.control.grid import Lateness, Tolerance
 from rsea_ros.control.law import Gains
 from rsea_ros.control.link import LinkShare
 from rsea_ros.control.synthesis import ControllerDesign, DesignLimits, check, design
 from rsea_ros.control.uncertainty import LIGHTEST, lightest, load_range
 from rsea_ros.errors import ParameterError
+from rsea_ros.hardware.device import State
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.rig_limits import SLEW, derive
+from rsea_ros.nodes._devices import witnesses_of
 from rsea_ros.nodes._parameters import AXIS, DERIVED, JOINT, NodeParameter, stated_limits
 from rsea_ros.nodes._realtime import REALTIME
 
@@ -120,6 +128,8 @@ def summary(designed: ControllerDesign) -> list[str]:
 
 OBEYED, SEEN = 0.05, 3.0
 """s after which a motor makes the torque that is commanded, N m, of which so much is surely seen."""
+ON_TOPICS = {"axis": "torque.z", "position_zero": "configure", "encoder_id": -1}
+"""Of a driver, as its topics are read: without their sign, and a rest tells what the angle counts from."""
 
 
 class ControllerLimits:
@@ -132,6 +142,7 @@ class ControllerLimits:
         self.lateness = Lateness(values["rate"], Tolerance(values["late_share"], values["late_time"]))
         self._off = self._idle = 0
         self._patience = max(1, round(OBEYED * values["rate"]))
+        self._witnesses = witnesses_of({**values, **ON_TOPICS})
 
     def clear(self) -> None:
         """Restart."""
@@ -148,6 +159,16 @@ class ControllerLimits:
             return False
         self._idle = 0
         return True
+
+    def falsified(self, stamp: int, r: Measurement, commanded: float) -> str:
+        """Return the fault of an ft that spring and motor contradict, in words, empty without one.
+
+        Its feedback would take the motor to a multiple of the desired torque, whatever the driver does
+        (decision 314). stamp: of the reading, ns. commanded: N m.
+        """
+        wrench = (0.0, 0.0, 0.0, 0.0, 0.0, r.ft)
+        state = State(stamp, r.position, r.velocity, r.motor_torque, stamp, wrench)
+        return str((self._witnesses and self._witnesses.take(state, commanded)) or "")
 
     def fault(self, ft: float, desired: float) -> str:
         """Return the fault that must end the torque, in words; empty without one.

@@ -108,9 +108,10 @@ class ControllerNode:
             self._polarity.start()
         late = (self._anchor.now() - stamp) / self._period - 1.0 if together else 0.0
         trust = self._limits.lateness.take(max(late, missed), max(together, int(missed > 0)))
+        falsified = self._limits.falsified(stamp, reading, self._torque)
         torque = self._next_torque(reading, missed, trust, off, acts=together > 0)
         desired = self._desired.torque if self._polarity.proven else reading.ft
-        if fault := self._polarity.contradiction or self._limits.fault(reading.ft, desired):
+        if fault := falsified or self._polarity.contradiction or self._limits.fault(reading.ft, desired):
             return self._latch(fault)
         self._torque = torque
         self._publish(self._grid.next)

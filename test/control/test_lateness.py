@@ -21,7 +21,7 @@ RATES = {
 RIG = load_rig("paper_high_impedance")
 VALUES = {
     "error_limit": 15.0, "error_time": 0.5, "ft_limit": 110.0, "late_share": 0.5, "late_time": 1.0,
-    "rate": 280.0,
+    "rate": 280.0, "rig": "paper_high_impedance",
 }  # fmt: skip
 
 

@@ -128,21 +128,29 @@ def test_a_sign_that_changes_under_torque_is_a_fault_within_two_samples(changed,
     if amplitude < 20.0 and changed == "velocity":
         return  # the angle goes on as before, and the momentum is all there is
     names, (told, most) = changed.split(" and "), TURNED[changed]
+    size = min(amplitude, 4.7) if rig is FREE else amplitude
+    words, k = falsified_under_torque(rig, size, dict.fromkeys(names, -1.0))
+    assert (f"with {told} reversed" if changed == "velocity" else f"{told} has changed its sign") in words
+    assert 292 < k <= 292 + most
+
+
+def falsified_under_torque(rig, amplitude, factors):
+    """Return the contradiction, and the number of its sample; at 292 factors begin to act."""
     plant, polarity, torque = Plant(rig, RATE), Polarity(rig, RATE, LIMIT), 0.0
-    controller, factors = TorqueController(rig, RATE, GAINS), {}
-    polarity.proven = True
+    controller, polarity.proven = TorqueController(rig, RATE, GAINS), True
     for k in range(1000):
-        reading = measured(plant.step(torque), factors)
+        reading = measured(plant.step(torque), factors if k > 292 else {})
         if polarity.watch(reading):
             break
-        size = min(amplitude, 4.7) if rig is FREE else amplitude
-        wanted = size * math.sin(2.0 * math.pi * 4.0 * k / RATE)
-        if k == 292:
-            factors = dict.fromkeys(names, -1.0)
-        torque = controller.step(reading, wanted)
+        torque = controller.step(reading, amplitude * math.sin(2.0 * math.pi * 4.0 * k / RATE))
         polarity.sent(torque)
-    assert f"{told} has changed its sign" in polarity.contradiction
-    assert 292 < k <= 292 + most
+    return polarity.contradiction, k
+
+
+def test_a_gain_of_ft_that_changes_is_not_called_a_sign():
+    """It was "joint_states has changed its sign"."""
+    words, _ = falsified_under_torque(RIG, 20.0, {"ft": 0.5})
+    assert "motor torque is" in words and "as with another gain" in words and "changed" not in words
 
 
 def test_states_that_stand_still_are_named_and_not_the_sensor_that_is_right():
