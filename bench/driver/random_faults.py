@@ -21,13 +21,14 @@ from pathlib import Path
 
 from bench.driver.loop import RATE, Loop
 from rsea_ros.errors import DeviceError
+from rsea_ros.hardware.dynamixel.own_limits import LOOK, OVERDUE
 from rsea_ros.hardware.peer.remote import RemoteBench
 
 CALM = {
     "drop": 0.0, "delay": 0.0, "corrupt": 0.0, "wrong_crc": 0.0, "silent": False, "ft_silent": False,
     "twin": False,
 }  # fmt: skip
-MODE_SEEN = 1_200_000_000
+MODE_SEEN = round(1e9 * (3.0 * LOOK + OVERDUE))
 """ns of cycles after which a driver has switched off a motor in another mode."""
 LONGEST, GRACE = 100_000_000, 50_000_000
 """ns for which a command allows a torque, and after a fault: its cycle, the ramp, a lost write."""

@@ -40,6 +40,8 @@ EXPLAINED = 0.4
 """Of that, what a changed sign may leave of it."""
 SENT = 4
 """Commands that a measured motor torque may belong to."""
+FROZEN, STUCK = 0.02, 0.5
+"""s for which joint_states repeat one value, and of PULSE by which the command has changed meanwhile."""
 TIMES = 2.5
 """Times the command that the motor torque may be."""
 REVERSED = {
@@ -70,7 +72,7 @@ class Polarity:
         self.proven, self.contradiction = False, ""
         self._sent, self._made = [0.0] * SENT, [0.0] * SENT
         self._friction, self._off, self._alike = 0.0, 0, 0
-        self._state = (0.0, 0.0, 0.0)
+        self._state, self._asked = (0.0, 0.0, 0.0), (0.0, 0.0)
         self._change.start()
         self._direction, self._level, self._beyond = -1.0, self._pulse, ENOUGH * self._pulse
         self._pulsing, self._back, self._full, self._torque = False, False, False, 0.0
@@ -105,6 +107,10 @@ class Polarity:
         self._made = [self._seen.made[1], *self._made[:-1]]
         before, self._state = self._state, (reading.position, reading.velocity, reading.motor_torque)
         self._alike = self._alike + 1 if self._state == before else 0
+        acted = [self._sent[-1], *(self._asked if self._alike else ())]
+        self._asked = min(acted), max(acted)
+        if self._alike * self._h > FROZEN and self._asked[1] - self._asked[0] > STUCK * self._pulse:
+            self._contradict("joint_states repeat one value")
         if self.contradiction:
             return self.contradiction
         rest = None if heard is None else self._made[0] - sum(heard)

@@ -24,8 +24,8 @@ PAUSE, LASTING = 0.1, 0.5
 UNEVEN = 0.5
 """Part of a deviation that a law which is not the same either way may make a mean of."""
 GRAVE, CYCLES, SIDED, DELAY = 2.5, 2, 0.5, 0.01
-"""Times its doubts by which the spring contradicts ft gravely; readings running that are a fault; part of that
-by which the motor may be off the spring that it sides with; s of delay between ft and spring."""
+"""Times its doubts by which the spring contradicts ft gravely; readings running that are a fault; part of
+that by which the motor may be off the spring that it sides with; s of delay between ft and spring."""
 LOST = 4.0
 """Periods from one reading to the next, from which on the momentum between them is not known."""
 
@@ -92,6 +92,7 @@ class Witnesses:
         """Begin anew."""
         self.words, self._off, self._grave = "", 0, 0
         self._low: Signals | None = None
+        self._noise = self._apart = 0.0
         self._rest, self._work = Window(), Window()
 
     def take(self, state: State, torque: float) -> DeviceFault | None:
@@ -112,7 +113,8 @@ class Witnesses:
             self._work = self._followed(self._work, self._low)
             if self._work.readings * self._period >= LASTING:
                 self._judge(self._work)
-            return self._gravely(self._low, signals)
+            live = (before.position, before.motor_torque) != (state.position, state.motor_torque)
+            return self._gravely(self._low, signals) if live else None  # else they are one witness, no two
         self._rest = self._followed(self._rest, self._low)
         if self._rest.readings * self._period >= LASTING:
             zero = self._rest.mean.ft - self._rest.mean.spring
@@ -137,14 +139,20 @@ class Witnesses:
     def _gravely(self, low: Signals, now: Signals) -> DeviceFault | None:
         """Return the fault of an ft that the spring contradicts gravely, and the motor sides with the spring.
 
-        now: what is ahead of the low-pass, which tells what a delay can make of it.
+        now: what is ahead of the low-pass, which tells what a delay can make of it. What ft and spring
+        change against each other from one reading to the next tells what noise can.
         """
-        late, hasty = (DELAY / SMOOTH * abs(x - y) for x, y in ((now.spring, low.spring), (now.motor, low.motor)))
-        bend = low.spring + self._zero
+        bend, self._apart, before = low.spring + self._zero, now.ft - now.spring, self._apart
+        if math.isnan(bend):
+            return None
+        part = min(self._period / SMOOTH, 1.0)
+        self._noise += part * (abs(self._apart - before) - self._noise)
+        ahead = abs(now.spring - low.spring), abs(now.motor - low.motor)
+        late, hasty = (DELAY / SMOOTH * torque for torque in ahead)
         off, least = abs(low.ft - bend), min(abs(low.ft), abs(bend)) if low.ft * bend > 0.0 else 0.0
         most = GRAVE * max(self._rig.bent * least, self._rig.play)
         sided = abs(bend - low.motor) + hasty < SIDED * off
-        self._grave = self._grave + 1 if sided and off - late > most else 0
+        self._grave = self._grave + 1 if sided and off - late - self._noise > most else 0
         if self._grave < CYCLES:
             return None
         return DeviceFault("ft", off, most, "N m", f"off: {self._told(low)}")

@@ -5,7 +5,9 @@ import math
 import pytest
 
 from rsea_ros.errors import DeviceError
+from rsea_ros.hardware.device import NoReply
 from rsea_ros.hardware.dynamixel.encoder import Unwrapper
+from rsea_ros.hardware.dynamixel.own_limits import Watchlist
 from rsea_ros.hardware.interlock import DeviceFault
 from rsea_ros.hardware.limits import Limits
 from test.hardware.conftest import Loop, well_behaved
@@ -64,6 +66,66 @@ def test_a_motor_in_another_mode_is_switched_off_for_a_goal_of_zero_does_not_sto
     loop.guarded.clear()
     assert loop.cycles(3, 10.0) == [10.0] * 3
     assert loop.device._motor.bus.get(loop.device._motor.control_table.operating_mode) == 0
+
+
+@pytest.mark.parametrize("why", ["a stop", "a fault", "a deactivation"])
+def test_a_motor_that_somebody_else_switches_on_is_off_again_at_once(loop, why):
+    """Another program on the port: after a fault it kept its torque, after a stop for 0.1 s."""
+    if why == "a fault":
+        loop.bench.ask("set", torque_enable=0)
+        loop.until_fault(10.0)
+    else:
+        {"a stop": loop.guarded.stop, "a deactivation": loop.guarded.disable}[why]()
+    loop.cycles(3, 10.0)
+    since = loop.bench.ask("set", mode=1, goal_velocity=100, torque_enable=1)["t"]
+    for _ in range(400):
+        loop.cycle(10.0)
+        if not loop.bench.torque()[1]:
+            break
+    log = loop.bench.log(since)["torque"]
+    assert any(on for _, _, on in log) and not loop.bench.torque()[1]
+    assert loop.guarded.fault.cause == "motor_state"
+    loop.guarded.clear()
+    loop.guarded.enable()
+    assert loop.cycles(3, 10.0) == [10.0] * 3
+
+
+class FlakyBus:
+    """A bus of which every second reply is lost."""
+
+    def __init__(self):
+        self.values, self.asked = {}, 0
+
+    def get(self, item):
+        self.asked += 1
+        if self.asked % 2:
+            raise NoReply("lost")
+        return self.values[item]
+
+
+@pytest.mark.parametrize("turn", [1.0 / 280.0, 0.03, 0.1])
+def test_a_register_is_looked_at_by_time_also_where_cycles_are_long_and_replies_are_lost(monkeypatch, turn):
+    """A lost reply was not asked for again for 0.27 s: a mode was seen after more than 1.2 s."""
+    now, bus = [0.0], FlakyBus()
+    monkeypatch.setattr("time.monotonic", lambda: now[0])
+    names = ("torque_enable", "operating_mode", "bus_watchdog")
+    watchlist, bus.values = Watchlist(bus), dict.fromkeys(names, 0)
+    watchlist.expect(*((name, name, 0) for name in names))
+    for moment in (3.0, 3.21, 3.47, 3.7):
+        for name in names:
+            bus.values = dict.fromkeys(names, 0) | {name: 3}
+            now[0], told = now[0] + moment, ""
+            begun = now[0]
+            while not told:
+                now[0] += turn
+                told = watchlist.look()
+            assert told == f"{name} is 3, expected 0" and now[0] - begun < 1.0
+            bus.values = dict.fromkeys(names, 0)
+    bus.get = lambda item: bus.asked and FlakyBus().get(item)
+    begun = now[0]
+    while not watchlist.look() and now[0] < begun + 1.0:
+        now[0] += turn
+    assert now[0] - begun < 0.6
 
 
 def test_counts_go_on_where_the_encoder_wraps_round(benches):

@@ -68,7 +68,7 @@ def falsify(device, monkeypatch, gain=1.0, bias=0.0):
         ("hold", 10.0, {"bias": 8.0}, 0.03),
         ("sine", 10.0, {"bias": -8.0}, 0.05),
         ("noise", 27.0, {"bias": 12.0}, 0.2),
-        ("hold", 10.0, {"gain": 0.5}, 0.05),
+        ("hold", 10.0, {"gain": 0.5}, 0.1),
         ("hold", 5.0, {"gain": 2.0}, 0.05),
         ("sine", 10.0, {"gain": 0.5}, 0.15),
         ("sine", 10.0, {"gain": -1.0}, 0.15),

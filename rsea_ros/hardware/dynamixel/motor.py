@@ -26,6 +26,8 @@ RETURN_DELAY_UNIT = 2e-6
 WATCHDOG_UNIT = 0.02
 WRITE, STATUS = 0x03, 0x55
 BOOT_TIME, BOOT_POLL = 5.0, 0.02
+WHILE_OFF = 0.05
+"""s after which it is looked at again whether a motor is still off."""
 AS_CONFIGURED = "as it was at configure (another one needs cleanup and configure)"
 
 
@@ -238,13 +240,17 @@ class Motor:
                 self.port.close()
 
     def _stop(self) -> None:
-        """Switch the torque off, then clear the watchdog: a tripped one refuses a new goal."""
+        """Switch the torque off, then clear the watchdog: a tripped one refuses a new goal.
+
+        From then on it is looked at whether somebody else on the line switches it on.
+        """
         table = self.control_table
         self._watchlist.expect()
         self.bus.set(table.torque_enable, 0)
         if self._watched:
             self.bus.set(table.bus_watchdog, 0)
         self.bus.set(table.goal_torque, 0)
+        self._watchlist.expect(("torque_enable", table.torque_enable, 0), every=WHILE_OFF)
 
     def _supervise(self) -> None:
         """Start a supervisor for a motor without a watchdog, and a new one for one that is dead."""

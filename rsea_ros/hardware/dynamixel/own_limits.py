@@ -81,8 +81,9 @@ def check_own_limits(limits: Limits, motor_limits: OwnLimits, name: str) -> None
         raise ParameterError(f"parameter {'; '.join(wrong)} ({name})")
 
 
-LOOK = 0.8
-"""s in which each register is looked at once; a fault is latched within a second."""
+LOOK, OVERDUE = 0.25, 0.2
+"""s from one register to the next, three under torque; for which one may not answer. So a fault is latched
+within a second, however long a cycle takes."""
 
 
 class Watchlist:
@@ -90,26 +91,28 @@ class Watchlist:
 
     def __init__(self, bus: Bus) -> None:
         self._bus = bus
-        self._expected: tuple[tuple[str, Item, int], ...] = ()
-        self._looks, self._looked = 0, 0.0
+        self.expect()
 
-    def expect(self, *registers: tuple[str, Item, int]) -> None:
-        """Set the expected registers from now on: name, item, value; empty: nothing is checked."""
-        self._expected = registers
+    def expect(self, *registers: tuple[str, Item, int], every: float = LOOK) -> None:
+        """Set the expected registers from now on: name, item, value; empty: nothing is checked.
+
+        every: s, one of them in turn.
+        """
+        self._expected, self._every = list(registers), every
+        self._due, self._asked = time.monotonic(), math.inf
 
     def look(self) -> str:
-        """Read one of them in turn, each once in LOOK; return its fault.
-
-        A lost reply is ignored: the register is read again later.
-        """
+        """Read the register that is due, again in the next cycle if its reply is lost; return its fault."""
         now = time.monotonic()
-        if not self._expected or now - self._looked < LOOK / len(self._expected):
+        if not self._expected or now < self._due:
             return ""
-        name, item, expected = self._expected[self._looks % len(self._expected)]
-        self._looked = now
+        name, item, expected = self._expected[0]
+        self._asked = min(self._asked, now)
         try:
             value = self._bus.get(item)
         except NoReply:
-            return ""
-        self._looks += 1
+            late = now - self._asked
+            return f"{name} could not be read for {late:.2g} s" if late > OVERDUE else ""
+        self._due, self._asked = max(self._due + self._every, self._asked), math.inf
+        self._expected.append(self._expected.pop(0))
         return "" if value == expected else f"{name} is {value}, expected {expected}"
