@@ -9,7 +9,6 @@ from typing import Any
 from rsea_ros.documents import strict_yaml
 from rsea_ros.documents.wording import did_you_mean, list_names
 from rsea_ros.errors import ParameterError, RseaError
-from rsea_ros.model.rig_file import rig_folders
 
 
 @dataclass(frozen=True)
@@ -103,6 +102,8 @@ def parameters_of_bench() -> Path:
 
 def _share() -> Path:
     """Return the folder of config/ and launch/: the clone, or the share of the installed package."""
+    from rsea_ros.model.rig_file import rig_folders  # and a compiler, for which a stop must not wait
+
     return next(folder.parents[1] for folder in rig_folders())
 
 

@@ -164,7 +164,7 @@ class Caller:
     def callable_nodes(self, seconds: float) -> list[str]:
         """Return the full names of the nodes with a lifecycle or a trigger; looks for some seconds."""
         time.sleep(seconds)
-        return [name for name in self._nodes() if self._has_lifecycle(name) or self._triggers(name)]
+        return [name for name in self._nodes() if self._offers(name)]
 
     def actions(self, name: str) -> tuple[str, ...]:
         """Return what a node would do now: its triggers, and the transitions that its state allows."""
@@ -179,14 +179,15 @@ class Caller:
     def call(self, name: str, action: str) -> str:
         """Do one action of a node and return its answer.
 
-        Raises ParameterError for an unknown node or action, CallRefused when the node does not do it.
+        A trigger needs no more than its own service: a stop waits for no other answer. Raises ParameterError
+        for an unknown node or action, CallRefused when the node does not do it.
         """
-        name = self.full_name(name)
+        name = self.full_name(name, action)
         self._discover(name, action)
-        if action in (transitions := self._transitions(name)):
-            return self._change(name, action, transitions[action])
         if action in self._triggers(name):
             return self._trigger(name, action)
+        if action in (transitions := self._transitions(name)):
+            return self._change(name, action, transitions[action])
         offered = self.actions(name)
         state = f" while {self.state(name)}" if self._has_lifecycle(name) else ""
         near = did_you_mean(action, offered)
@@ -196,6 +197,8 @@ class Caller:
         """Return when a node offers an action, or has offered nothing new for a while."""
         before, since = None, 0.0
         for _ in _looks(DISCOVERY):
+            if action in self._triggers(name):
+                return
             if (offered := self.actions(name)) != before:
                 before, since = offered, time.monotonic()
             if action in offered or time.monotonic() >= since + _UNCHANGED:
@@ -214,14 +217,23 @@ class Caller:
             raise CallRefused(f"{name}: {service} was refused: {answer.message}")
         return f"{name}: {answer.message or service}"
 
-    def full_name(self, name: str) -> str:
-        """Return the full name of a node. Raises ParameterError when it does not run or offers nothing."""
+    def full_name(self, name: str, trigger: str = "") -> str:
+        """Return the full name of a node. Raises ParameterError when it does not run or offers nothing.
+
+        trigger: a service of it that is enough: on a busy machine the node is heard of seconds later.
+        """
         name = absolute(name)
-        if not any(name in self._nodes() and self.actions(name) for _ in _looks(_SEARCH)):
+        if not any(
+            trigger in self._triggers(name) or (name in self._nodes() and self._offers(name))
+            for _ in _looks(_SEARCH)
+        ):
             visitor = absolute(self._node.get_name())
             near = did_you_mean(name, [other for other in self._nodes() if other != visitor])
             raise ParameterError(f"node {name}: it does not run{near} (rsea call lists what does)")
         return name
+
+    def _offers(self, name: str) -> bool:
+        return self._has_lifecycle(name) or bool(self._triggers(name))
 
     def _nodes(self) -> list[str]:
         pairs = self._node.get_node_names_and_namespaces()

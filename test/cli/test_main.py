@@ -205,12 +205,12 @@ def test_summary_reads_help_without_importing(tmp_path, source):
 
 def test_only_the_chosen_verb_is_imported_and_nothing_heavy():
     code = ("import sys; from rsea_ros.cli.main import main; main(['--help'])\n"
-            "try: main(['test', '--help'])\n"
+            "try: main(['call', '--help'])\n"
             "except SystemExit: pass\n"
             "print([m for m in sys.modules if m.startswith('rsea_ros.cli.') and '._' not in m])\n"
             "print({'numpy', 'scipy', 'rclpy', 'numba', 'rich', 'plotly'} & set(sys.modules))")
     done = run_python("-c", code)
-    assert done.stdout.splitlines()[-2:] == ["['rsea_ros.cli.main', 'rsea_ros.cli.test']", "set()"]
+    assert done.stdout.splitlines()[-2:] == ["['rsea_ros.cli.main', 'rsea_ros.cli.call']", "set()"]
     assert done.stderr == ""
 
 

@@ -8,6 +8,7 @@ import subprocess
 import sys
 from contextlib import nullcontext
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -15,6 +16,7 @@ import yaml
 from bad_input import rsea as played
 from rclpy.lifecycle import LifecycleNode
 
+from msg_adapters.ros import Trigger
 from rsea_ros import processes
 from rsea_ros.cli import main as cli
 from rsea_ros.cli._graph import node_calls
@@ -123,6 +125,7 @@ def visitor():
     """A node beside /rsea/mute, whose lifecycle never answers, as that of a node that hangs."""
     with _visitor.visit("visitor") as node:
         mute = LifecycleNode("mute", namespace="rsea")
+        mute.create_service(Trigger, "~/stop", lambda request, answer: answer)
         yield node
         mute.destroy_node()
 
@@ -138,8 +141,17 @@ def test_a_named_node_is_listed_without_a_question_to_the_others(visitor, monkey
     asked = []
     monkeypatch.setattr(_visitor, "visit", lambda name: nullcontext(visitor))
     monkeypatch.setattr(_visitor.Caller, "actions", lambda self, name: asked.append(name) or ("stop",))
+    monkeypatch.setattr(_visitor.Caller, "_offers", lambda self, name: True)
     assert cli.main(["call", "visitor"]) == 0
     assert set(asked) == {"/rsea/visitor"} and "stop" in capsys.readouterr().out
+
+
+def test_a_stop_asks_nothing_but_its_own_service(visitor, monkeypatch):
+    """It was the fourth question, each of which a busy machine answers late or loses."""
+    asked, answer = [], SimpleNamespace(success=True, message="off")
+    monkeypatch.setattr(_visitor.Caller, "_ask", lambda self, kind, name, *more: asked.append(name) or answer)
+    assert _visitor.Caller(visitor).call("mute", "stop") == "/rsea/mute: off"
+    assert asked == ["/rsea/mute/stop"]
 
 
 def test_a_driver_is_activated_stopped_and_cleared_by_calls(tmp_path):
