@@ -184,7 +184,8 @@ def _runs(loop: Loop, bench: RemoteBench, trial: Trial) -> tuple[list[Run], int,
         begun = time.monotonic_ns()
         run = _once(loop, bench, trial)
         still, waited = bench.stood_still(begun), 1e3 * max(loop.spent[-400:])
-        stalled = run.cause == "heldup" or (run.cause == "no_reply" and max(still, waited) > 1e3 / RATE)
+        missed = run.cause in ("no_reply", "ft") and max(still, waited) > 1e3 / RATE
+        stalled = run.cause == "heldup" or missed
         if stalled and not trial.latched and again < AGAIN:
             again += 1
             why = f"{run.cause}, bench still for {still:.0f} ms, a cycle took {waited:.0f} ms"
