@@ -45,7 +45,6 @@ class DrivenJoint:
         self, node: Node, jobs: Jobs, part: str, values: Mapping[str, Any], device: Device,
         offers: list[Offer],
     ) -> None:  # fmt: skip
-        self._offers = offers
         self._node, self._jobs, self.part, self._values = node, jobs, part, values
         limits = partial(limits_of, values)
         self.guarded = GuardedDevice(
@@ -57,12 +56,12 @@ class DrivenJoint:
         self._ended = ""
         self._reported: tuple[DeviceFault | None, int] = (None, 0)
         self._health = Health(node, self.report, part=part)
+        space, after = f"{part}/" if part else "", self._health.publish
         for name, work in (
             ("zero_ft", self._zero_ft), ("clear_fault", self.clear_fault), ("reboot", self._reboot),
-            ("stop", self._stop),
         ):  # fmt: skip
-            after = self._answered if name == "stop" else self._health.publish
-            offers.append(Offer(node, jobs, f"{part}/{name}" if part else name, self._guard(work), after))
+            offers.append(Offer(node, jobs, space + name, work, after))
+        offers.append(stop_of(node, jobs, f"{space}stop", [self], offers, after))
 
     def open(self, anchor: Anchor) -> None:
         """Open the device and make its topics. Raises RseaError, OSError; nothing stays open then."""
@@ -130,39 +129,28 @@ class DrivenJoint:
 
     def clear_fault(self, asked: int) -> str:
         """End a fault whose cause is over. asked: see GuardedDevice.clear. Raises DeviceError."""
-        assert self.drive is not None
+        drive = self.opened()
         if self.guarded.fault is None:
             return "there is no fault; nothing was done"
-        with self.drive.deaf():
+        with drive.deaf():
             self.guarded.clear(asked)
         return "done"
 
-    def _stop(self, asked: int) -> str:
-        return stop([self])
-
-    def _answered(self) -> None:
-        answer_stop([self], self._offers)
-        self._health.publish()
-
     def _zero_ft(self, asked: int) -> str:
+        self.opened()
         self.guarded.zero_ft()
         return "done"
 
     def _reboot(self, asked: int) -> str:
-        assert self.drive is not None
-        with self.drive.deaf():
+        with self.opened().deaf():
             self.guarded.reboot()
         return "done" if self.guarded.fault is None else f"done; fault {self.guarded.fault}"
 
-    def _guard(self, work: Work) -> Work:
-        """Return work that is refused while there is no open device."""
-
-        def done(asked: int) -> str:
-            if self.drive is None:
-                raise RseaError("the driver is not configured, expected it to be")
-            return work(asked)
-
-        return done
+    def opened(self) -> DriverCycle:
+        """Return what drives the open device. Raises RseaError without one."""
+        if self.drive is None:
+            raise RseaError("the driver is not configured, expected it to be")
+        return self.drive
 
     def report(self) -> NodeHealth:
         """Return its health."""
@@ -198,9 +186,8 @@ def stop(joints: Sequence[DrivenJoint]) -> str:
 
     Raises DeviceError where a motor has not acknowledged that it is off; the stop holds all the same.
     """
-    for joint in joints:
-        assert joint.drive is not None
-        joint.drive.stop(is_answered=False)
+    for drive in [joint.opened() for joint in joints]:
+        drive.stop(is_answered=False)
     time.sleep(OVERTAKING)
     end = time.monotonic() + CONFIRMING
     while on := [joint for joint in joints if not joint.guarded.is_off]:
@@ -218,15 +205,23 @@ def stop(joints: Sequence[DrivenJoint]) -> str:
     return "torque zero until clear_fault, the motor is off"
 
 
-def answer_stop(joints: Sequence[DrivenJoint], offers: Sequence[Offer]) -> None:
-    """Note that a stop is answered now. offers: services of which requests that wait came before that.
+def stop_of(
+    node: Node, jobs: Jobs, name: str, joints: Sequence[DrivenJoint], offers: list[Offer],
+    after: Callable[[], None],
+) -> Offer:  # fmt: skip
+    """Return the service that stops joints. offers: services of which requests that wait came before it.
 
     The middleware hands the requests of several services over in any order, and a busy executor late.
     """
-    for offer in offers:
-        offer.take_up()
-    for joint in joints:
-        joint.guarded.interlock.answer()
+
+    def answer() -> None:
+        for offer in offers:
+            offer.take_up()
+        for joint in joints:
+            joint.guarded.interlock.answer()
+        after()
+
+    return Offer(node, jobs, name, lambda asked: stop(joints), answer)
 
 
 class Offer:

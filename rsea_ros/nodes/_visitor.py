@@ -182,27 +182,19 @@ class Caller:
         A trigger needs no more than its own service: a stop waits for no other answer. Raises ParameterError
         for an unknown node or action, CallRefused when the node does not do it.
         """
-        name = self.full_name(name, action)
-        self._discover(name, action)
-        if action in self._triggers(name):
-            return self._trigger(name, action)
-        if action in (transitions := self._transitions(name)):
-            return self._change(name, action, transitions[action])
-        offered = self.actions(name)
+        name, before, since = self.full_name(name, action), None, 0.0
+        for _ in _looks(DISCOVERY):
+            if action in (triggers := self._triggers(name)):
+                return self._trigger(name, action)
+            if action in (transitions := self._transitions(name)):
+                return self._change(name, action, transitions[action])
+            if (offered := (*transitions, *triggers)) != before:
+                before, since = offered, time.monotonic()
+            elif time.monotonic() >= since + _UNCHANGED:  # it has shown all that it offers
+                break
         state = f" while {self.state(name)}" if self._has_lifecycle(name) else ""
         near = did_you_mean(action, offered)
         raise ParameterError(f"{name}: {action!r}{state}, expected one of: {', '.join(offered)}{near}")
-
-    def _discover(self, name: str, action: str) -> None:
-        """Return when a node offers an action, or has offered nothing new for a while."""
-        before, since = None, 0.0
-        for _ in _looks(DISCOVERY):
-            if action in self._triggers(name):
-                return
-            if (offered := self.actions(name)) != before:
-                before, since = offered, time.monotonic()
-            if action in offered or time.monotonic() >= since + _UNCHANGED:
-                return
 
     def _change(self, name: str, transition: str, number: int) -> str:
         request = ChangeState.Request()

@@ -25,7 +25,7 @@ from rsea_ros.nodes._cycle import Cycle
 from rsea_ros.nodes._device_parameters import ENCODER, LIMITS, MOTOR, SAFETY, SENSOR, devices_of
 from rsea_ros.nodes._devices import DEVICES
 from rsea_ros.nodes._drive import SignalListener, step
-from rsea_ros.nodes._joint import DrivenJoint, Offer, answer_stop, stop
+from rsea_ros.nodes._joint import DrivenJoint, Offer, stop_of
 from rsea_ros.nodes._joints import JOINTS, Jobs, joint_table, joint_values
 from rsea_ros.nodes._parameters import NodeParameter
 from rsea_ros.nodes._realtime import REALTIME, keep_time, stop_keeping_time
@@ -79,11 +79,10 @@ class DriverNode(ManagedEntity):
             for (name, joint), device in zip(named, devices, strict=True)
         ]
         if named[0][0]:
-            for service, work, after in (
-                ("stop", self._stop, self._answered),
-                ("clear_fault", self._clear_faults, lambda: None),
-            ):
-                self._offers.append(Offer(node, self._jobs, service, work, after))
+            self._offers += [
+                stop_of(node, self._jobs, "stop", self.joints, self._offers, lambda: None),
+                Offer(node, self._jobs, "clear_fault", self._clear_faults, lambda: None),
+            ]
         self._cycle: Cycle | None = None
         self._combined: Combined | None = None
         node.add_managed_entity(self)
@@ -219,19 +218,11 @@ class DriverNode(ManagedEntity):
             self._close_devices()
             raise
 
-    def _stop(self, asked: int) -> str:
-        self._check_configured()
-        return stop(self.joints)
-
-    def _answered(self) -> None:
-        answer_stop(self.joints, self._offers)
-
     def _clear_faults(self, asked: int) -> str:
         """Clear every joint's fault; one that cannot be cleared does not affect the others.
 
         A joint waits for those before it, and may be stopped meanwhile: that is later than this request.
         """
-        self._check_configured()
         done, failed = [], []
         for joint in self.joints:
             try:
@@ -241,10 +232,6 @@ class DriverNode(ManagedEntity):
         if failed:
             raise DeviceError("; ".join((*failed, *done)))
         return ", ".join(done)
-
-    def _check_configured(self) -> None:
-        if self._cycle is None:
-            raise RseaError("the driver is not configured, expected it to be")
 
 
 def main() -> int:

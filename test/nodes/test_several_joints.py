@@ -13,6 +13,7 @@ from msg_adapters.ros import DiagnosticArray, JointState, Trigger, stamp_of, tor
 from rsea_ros.errors import DeviceError, ParameterError
 from rsea_ros.hardware.interlock import event
 from rsea_ros.nodes import driver
+from rsea_ros.nodes._joint import stop
 from rsea_ros.nodes._joints import joint_table
 from rsea_ros.nodes._qos import COMMAND, MEASUREMENT
 from test.nodes.on_wire import newest_status, value_in
@@ -223,9 +224,10 @@ def test_a_joint_that_is_stopped_while_another_one_is_cleared_stays_stopped(make
     monkeypatch.setattr(driver, "DEVICES", {"simulated": lambda values: spies[values["joint"]]})
     program, _ = make_driver("held", values_of(joints=["hip", "knee"], autostart=True, resume=True))
     hip, knee = program.joints
-    program._stop(event())
-    program._answered()
-    monkeypatch.setattr(spies["hip"], "recover", lambda: knee._stop(event()))
+    stop([hip, knee])
+    for joint in (hip, knee):
+        joint.guarded.interlock.answer()
+    monkeypatch.setattr(spies["hip"], "recover", lambda: stop([knee]))
     with pytest.raises(DeviceError, match="knee: stopped: ~/stop was called meanwhile"):
         program._clear_faults(event())
     assert hip.guarded.interlock.is_free and knee.guarded.interlock.stopped
