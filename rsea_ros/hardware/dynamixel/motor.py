@@ -26,7 +26,7 @@ RETURN_DELAY_UNIT = 2e-6
 WATCHDOG_UNIT = 0.02
 WRITE, STATUS = 0x03, 0x55
 BOOT_TIME, BOOT_POLL = 5.0, 0.02
-WHILE_OFF = 0.05
+WHILE_OFF = 0.1
 """s after which it is looked at again whether a motor is still off."""
 AS_CONFIGURED = "as it was at configure (another one needs cleanup and configure)"
 
