@@ -14,7 +14,7 @@ import numpy as np
 
 from rsea_ros.control.controller import Measurement
 from rsea_ros.control.spring_encoder import spread
-from rsea_ros.model.rig import Rig
+from rsea_ros.model.rig import END_NAMES, Rig
 from rsea_ros.records.record import HUGE, FloatArray, is_measured
 
 Signs = tuple[float, float]
@@ -32,6 +32,8 @@ POWER = 12.0
 """Half the difference of two sums of squares that a power of the wrong sign counts for."""
 CLEAR, SIGMAS = 0.3, 3.0
 """Part of the motor's power that must go one way; standard deviations by which the load's must be known."""
+BOTH = (1.6, 1.3)
+"""Factors by which the angle between clamped ends, and surely the motor torque, contradict ft together."""
 DOUBT = 0.5
 """Part of J w' + b w that nobody knows."""
 GAIN = 2.5
@@ -54,7 +56,7 @@ class SignEvidence:
         """rate: Hz. pulse: N m, the size of a pulse of torque."""
         self._h, self._pulse = 1.0 / rate, pulse
         self._inertia, self._damping = rig["rotor.reflected_inertia"], rig["rotor.reflected_damping"]
-        self._stiffness = rig["spring.stiffness"]
+        self._stiffness, self._clamped = rig["spring.stiffness"], rig.clamped == set(END_NAMES)
         noise = math.hypot(self._inertia * spread(rig, "velocity") * math.sqrt(2.0) * rate, spread(rig, "ft"))
         self.ft_noise = max(spread(rig, "ft"), 1e-3 * pulse)
         self.noise = math.hypot(noise, spread(rig, "motor_torque"))
@@ -153,8 +155,15 @@ class SignEvidence:
         if self.most > GAIN * self.way + MOVED * self._pulse + 2.0 * SIGMAS * self._restless:
             return f"joint_states moved by {self.way:.3g} N·m of spring, ft by {self.most:.3g} N·m"
         ft, doubt = self._size()
-        if ft - doubt > GAIN or 0.0 < ft - doubt < ft + doubt < 1.0 / GAIN:
+        low, high = ft - doubt, ft + doubt
+        if low > GAIN or 0.0 < low < high < 1.0 / GAIN:
             return f"ft is {1.0 / ft:.2g} times the torque by motor torque and motion"
+        beyond = MOVED * self._pulse + 2.0 * SIGMAS * self._restless
+        half = low > BOTH[1] and self.way > BOTH[0] * self.most + beyond
+        double = 0.0 < high < 1.0 / BOTH[1] and self.most > BOTH[0] * self.way + beyond
+        if self._clamped and (half or double):
+            spring = f"K times the gear's angle by {self.way:.3g} N·m"
+            return f"ft moved by {self.most:.3g}, {spring}, and ft is {1.0 / ft:.2g} times the motor's torque"
         return ""
 
     def size_is_known(self) -> bool:

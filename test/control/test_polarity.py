@@ -95,6 +95,13 @@ def test_a_torque_that_is_ten_times_off_is_a_fault(factors, command):
     assert "expected ft positive" in polarity.contradiction or "N·m at a command" in polarity.contradiction
 
 
+@pytest.mark.parametrize("gain", [0.5, 2.0])
+def test_an_ft_that_reads_half_or_double_contradicts_angle_and_motor_in_the_pulses(gain):
+    """Half of it made 43 N m for 5 in the first tenth of a second of feedback."""
+    polarity, largest = probe(RIG, {"ft": gain})
+    assert "times the motor's torque" in polarity.contradiction and largest < 9.0
+
+
 def test_a_velocity_with_unstated_noise_says_nothing_of_the_size_of_ft():
     """Four samples under a fit of three left nothing: ft was 0.003 times the torque on 10 of 25 benches."""
     seen = SignEvidence(RIG, RATE, 4.0)
