@@ -8,7 +8,7 @@ from itertools import pairwise
 from statistics import fmean
 
 from rsea_ros.nodes._anchor import SECOND, Anchor
-from rsea_ros.nodes._realtime import exact_timers
+from rsea_ros.nodes._realtime import Worker
 
 __all__ = ["SECOND", "Cycle", "Timing", "wait_until"]
 
@@ -34,7 +34,7 @@ class Timing:
         }
 
 
-class Cycle:
+class Cycle(Worker):
     """Call `work(stamp)` at start + k / rate, stamp being that instant in ns since the epoch.
 
     A cycle is missed when the next one was due before it began. catch_up: missed cycles run late,
@@ -47,13 +47,12 @@ class Cycle:
     def __init__(
         self, rate: float, work: Callable[[int], None], *, catch_up: bool, anchor: Anchor | None = None
     ) -> None:
+        super().__init__()
         self._rate, self._work, self._catch_up = rate, work, catch_up
         self._given, self.anchor = anchor, anchor or Anchor()
-        self._stop, self._over = threading.Event(), threading.Event()
-        self.thread = threading.Thread(target=self._run, daemon=True)
+        self._over = threading.Event()
         self._began: list[int] = []
         self._missed = self.left_out = 0
-        self.error: Exception | None = None
 
     def start(self, first: int | None = None) -> None:
         """Begin with the cycle of stamp `first`, by default one period from now."""
@@ -62,22 +61,10 @@ class Cycle:
         self._first = begin + self._instant(1) if first is None else first - self.anchor.offset
         self.thread.start()
 
-    def stop(self) -> None:
-        """End after the cycle that runs now."""
-        self._stop.set()
-        if self.thread.is_alive() and threading.current_thread() is not self.thread:
-            self.thread.join()
-
     def rest(self) -> None:
         """Return when the work of a cycle is over, so that another thread's work delays no cycle."""
         self._over.clear()
         self._over.wait(2.0 / self._rate)
-
-    def is_running(self) -> bool:
-        """Return whether it still runs. Raises the error of `work`."""
-        if self.error is not None:
-            raise self.error
-        return self.thread.is_alive()
 
     def timing(self) -> Timing:
         """Return the statistics since the last call."""
@@ -89,25 +76,22 @@ class Cycle:
     def _instant(self, k: int) -> int:
         return round(k * SECOND / self._rate)
 
-    def _run(self) -> None:
+    def run(self) -> None:
+        """Work at the deadlines."""
         k = 0
-        exact_timers()
-        try:
-            while not self._stop.is_set():
-                due = self._first + self._instant(k)
-                wait_until(due)
-                now = time.monotonic_ns()
-                self._began.append(now)
-                late = int((now - due) * self._rate / SECOND)
-                self._missed += late > 0
-                self._work(due + self.anchor.offset)
-                self._over.set()
-                allowed = int(LONGEST_CATCH_UP * self._rate / SECOND) if self._catch_up else 0
-                skipped = late if late > allowed else 0
-                self.left_out += skipped
-                k += 1 + skipped
-        except Exception as error:  # handed to the main thread by `running`
-            self.error = error
+        while not self.stopping.is_set():
+            due = self._first + self._instant(k)
+            wait_until(due)
+            now = time.monotonic_ns()
+            self._began.append(now)
+            late = int((now - due) * self._rate / SECOND)
+            self._missed += late > 0
+            self._work(due + self.anchor.offset)
+            self._over.set()
+            allowed = int(LONGEST_CATCH_UP * self._rate / SECOND) if self._catch_up else 0
+            skipped = late if late > allowed else 0
+            self.left_out += skipped
+            k += 1 + skipped
 
 
 def wait_until(due: int) -> None:

@@ -9,7 +9,7 @@ import sys
 import threading
 from collections.abc import Mapping, Set
 from contextlib import suppress
-from typing import Any, Protocol
+from typing import Any
 
 from rclpy.node import Node
 
@@ -35,13 +35,40 @@ REALTIME = (
 """Of every node that has to answer in time."""
 
 
-class Worker(Protocol):
-    """The owner of a thread."""
+class Worker:
+    """A thread with exact timers that does `run` of its kind until `stop`. error: what ended it before."""
 
-    thread: threading.Thread
+    def __init__(self) -> None:
+        self.stopping = threading.Event()
+        self.thread = threading.Thread(target=self._keep_error, daemon=True)
+        self.error: Exception | None = None
 
     def start(self) -> None:
         """Begin."""
+        self.thread.start()
+
+    def stop(self) -> None:
+        """End after the work that is done now."""
+        self.stopping.set()
+        if self.thread.is_alive() and threading.current_thread() is not self.thread:
+            self.thread.join()
+
+    def is_running(self) -> bool:
+        """Return whether it still runs. Raises the error of its work."""
+        if self.error is not None:
+            raise self.error
+        return self.thread.is_alive()
+
+    def run(self) -> None:
+        """Work until `stopping` is set."""
+        raise NotImplementedError
+
+    def _keep_error(self) -> None:
+        exact_timers()
+        try:
+            self.run()
+        except Exception as error:  # handed to the main thread by `is_running`
+            self.error = error
 
 
 def keep_time(node: Node, worker: Worker, values: Mapping[str, Any]) -> None:

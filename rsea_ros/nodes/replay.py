@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-import threading
 import time
 from collections.abc import Iterable
 from typing import Any
@@ -19,6 +18,7 @@ from rsea_ros.nodes._cycle import SECOND, wait_until
 from rsea_ros.nodes._health import OK, STEADY, Health, NodeHealth
 from rsea_ros.nodes._parameters import NodeParameter
 from rsea_ros.nodes._qos import COMMAND, DISCOVERY_TIME, LATCHED, RECORD_RELIABLE
+from rsea_ros.nodes._realtime import Worker
 from rsea_ros.nodes._run import run_node
 
 TABLE = (
@@ -42,12 +42,13 @@ HEARTBEAT = Duration(seconds=4)
 """Longer than the middleware takes to learn that a reliable subscriber has everything."""
 
 
-class ReplayNode:
+class ReplayNode(Worker):
     """A thread that publishes serialised messages when they are due. It ends when all have arrived."""
 
     def __init__(self, node: Node, values: dict[str, Any]) -> None:
         if not values["bag"]:
             raise ParameterError("parameter bag is empty, expected the path of a bag")
+        super().__init__()
         self._node, self._pace = node, values["rate"]
         rows = list(iterate(values["bag"]))
         begin = rows[0][2] + round(values["start"] * SECOND) if rows else 0
@@ -57,11 +58,10 @@ class ReplayNode:
         self._publishers = self._advertise({(topic, kind) for topic, kind, _, _ in self._rows})
         self._clock = node.create_publisher(Clock, "/clock", COMMAND) if values["clock"] else None
         self._wanted = values["subscribers"]
-        self._played, self._stop, self._done = 0, threading.Event(), threading.Event()
-        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._played = 0
         self._health = Health(node, self._report)
         node.create_timer(1.0, self._tell, clock=STEADY)
-        self._thread.start()
+        self.start()
 
     def _advertise(self, topics: Iterable[tuple[str, str]]) -> dict[str, Publisher[Any]]:
         """Return a publisher for each topic whose type is installed."""
@@ -74,14 +74,15 @@ class ReplayNode:
                 self._node.get_logger().warning(f"{topic} is left out: {error}")
         return publishers
 
-    def _run(self) -> None:
+    def run(self) -> None:
+        """Publish them."""
         heard = [each for topic, each in self._publishers.items() if topic.rpartition("/")[2] in WAIT_FOR]
         while any(publisher.get_subscription_count() < self._wanted for publisher in heard):
-            if self._stop.wait(0.05):
+            if self.stopping.wait(0.05):
                 return
         begin, first, ticked = time.monotonic_ns() + DISCOVERY_TIME, self._rows[0][2], 0
         for topic, _, logged, raw in self._rows:
-            if self._stop.is_set():
+            if self.stopping.is_set():
                 return
             wait_until(begin + round((logged - first) / self._pace))
             if self._clock and time.monotonic_ns() - ticked > CLOCK_PERIOD:
@@ -92,20 +93,16 @@ class ReplayNode:
             self._played += 1
         for publisher in self._publishers.values():
             publisher.wait_for_all_acked(HEARTBEAT)
-        self._done.set()
 
     def is_finished(self) -> bool:
-        """Return whether all messages are published and have arrived."""
-        return self._done.is_set()
+        """Return whether all messages are published and have arrived. Raises what ended it before."""
+        return not self.is_running()
 
     def conclude(self) -> None:
         """Report the played messages."""
         self._tell()
 
-    def close(self) -> None:
-        """Stop playing."""
-        self._stop.set()
-        self._thread.join()
+    close = Worker.stop
 
     def _tell(self) -> None:
         if self._played:
