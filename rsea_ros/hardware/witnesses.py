@@ -23,9 +23,9 @@ PAUSE, LASTING = 0.1, 0.5
 """s without torque that are a rest; s that a window has at least, and for which a contradiction lasts."""
 UNEVEN = 0.5
 """Part of a deviation that a law which is not the same either way may make a mean of."""
-GRAVE, CYCLES, SIDED, DELAY = 2.5, 2, 0.5, 0.01
+GRAVE, CYCLES, SIDED = 2.5, 2, 0.5
 """Times its doubts by which the spring contradicts ft gravely; readings running that are a fault; part of
-that by which the motor may be off the spring that it sides with; s of delay between ft and spring."""
+that by which the motor may be off the spring that it sides with."""
 LOST = 4.0
 """Periods from one reading to the next, from which on the momentum between them is not known."""
 
@@ -36,7 +36,7 @@ class Actuator:
 
     by_angle: whether the gear's angle is the spring's deflection, where that is not measured. bent, driven,
     risen, dragged: doubts, parts of the torques of spring and motor, of J w' and b w. play, friction: N m.
-    creep: rad/s, below which the way is not known.
+    creep: rad/s, below which the way is not known. late: s, by which readings may be of other instants.
     """
 
     damping: float
@@ -50,6 +50,7 @@ class Actuator:
     play: float
     friction: float
     creep: float
+    late: float
 
 
 class Signals(NamedTuple):
@@ -148,7 +149,7 @@ class Witnesses:
         part = min(self._period / SMOOTH, 1.0)
         self._noise += part * (abs(self._apart - before) - self._noise)
         ahead = abs(now.spring - low.spring), abs(now.motor - low.motor)
-        late, hasty = (DELAY / SMOOTH * torque for torque in ahead)
+        late, hasty = (self._rig.late / SMOOTH * torque for torque in ahead)
         off, least = abs(low.ft - bend), min(abs(low.ft), abs(bend)) if low.ft * bend > 0.0 else 0.0
         most = GRAVE * max(self._rig.bent * least, self._rig.play)
         sided = abs(bend - low.motor) + hasty < SIDED * off

@@ -1,6 +1,7 @@
 """ft beside K times deflection and motor torque: zero point and gain under torque."""
 
 import math
+from collections import deque
 from dataclasses import replace
 from functools import partial
 
@@ -11,7 +12,7 @@ from rsea_ros.control.controller import Measurement, TorqueController
 from rsea_ros.control.law import Gains
 from rsea_ros.hardware.guarded import GuardedDevice
 from rsea_ros.hardware.simulated import SECOND, SimulatedDevice
-from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.rig_file import load_rig, save_rig
 from rsea_ros.model.simulation import Plant
 from rsea_ros.nodes import _control, driver
 from rsea_ros.nodes._devices import limits_of, spring_of, witnesses_of
@@ -112,6 +113,26 @@ def test_a_controller_does_not_follow_an_ft_that_reads_half_to_twice_the_torque(
         torque = controller.step(reading, 10.0 * WAVES[wave](time - 0.7, None))
         made = max(made, abs(sample.ft))
     assert bool(fault) == (gain == 0.5) and made < 16.0
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.04])
+def test_a_delay_of_ft_that_the_rig_states_is_no_contradiction(monkeypatch, tmp_path, delay):
+    """Beyond 10 ms one that nobody states is."""
+    rig = load_rig(RIG)
+    late = replace(rig, sensors={**rig.sensors, "ft": replace(rig.sensors["ft"], delay=delay)})
+    save_rig(late, tmp_path / "model.yaml")
+    guarded, now, device = bench(str(tmp_path / "model.yaml"), rig)
+    read, waiting = device.read, deque([(0.0,) * 6] * 11, maxlen=12)
+
+    def delayed():
+        state = read()
+        waiting.append(state.wrench)
+        return replace(state, wrench=waiting[0])
+
+    monkeypatch.setattr(device, "read", delayed)
+    play(guarded, now, "rest", 0.0, 1.0)
+    play(guarded, now, "sine", 30.0, 1.0, until_fault=True)
+    assert (guarded.fault is None) == (delay > 0.0)
 
 
 @pytest.mark.parametrize(
