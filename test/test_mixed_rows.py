@@ -13,7 +13,7 @@ from rsea_ros.records.record import Channel
 from rsea_ros.records.stamps import repair_stamps
 
 RIG = rsea.load_rig("paper_high_impedance")
-SOUND = rsea.simulate(RIG, 15.0 * np.random.default_rng(1).standard_normal(4200))
+SOUND = rsea.simulate(RIG, 15.0 * np.random.default_rng(1).standard_normal(4200), rate=280.0)
 
 
 def sorted_after(step):
