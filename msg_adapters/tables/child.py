@@ -1,10 +1,8 @@
 """A reader in a process of its own, and the elements that it returns.
 
-A reader is a file `_NAME_reader.py` with its ceilings MEMORY and SECONDS, what it raises for other than
-numbers (Refused), what it says of a DAMAGED file, and `read`. `_child.py` runs it with FILE, the largest
-number of values and the places of the columns in JSON, and answers with a line of JSON, {"sizes": …} in the
-order of the columns, {"column": …, "names": …} for one that the file has not, or {"error": …}; then the
-numbers, as doubles.
+`_readers.py` gets FORMAT, FILE, the largest number of values and the places of the columns in JSON, and
+answers with a line of JSON, {"sizes": …} in the order of the columns, {"column": …, "names": …} for one that
+the file has not, or {"error": …}; then the numbers, as doubles.
 
 `name[1]` is the second number of each sample: of a list in a cell, or a column of a matrix. `name[1,:]` is
 a row of a matrix whose samples lie side by side; MATLAB's `name(:,2)` and `name(2,:)` are the same two.
@@ -100,23 +98,20 @@ def is_open(text: str) -> bool:
     return 2 * CHOSEN in text or re.search(r"[\[,:]#[\],]", text) is not None
 
 
-PROGRAM = Path(__file__).with_name("_child.py")
-
-
+PROGRAM = Path(__file__).with_name("_readers.py")
 SECONDS = 90.0
 """After which a reader is ended: its own ceiling is processor time. The largest MAT file takes 3 s, three
 columns of ten million rows of Parquet 2 s."""
 
 
-def read_apart(name: str, child: Path, limit: int, path: Path, columns: Sequence[str]) -> Table:
+def read_apart(name: str, limit: int, path: Path, columns: Sequence[str]) -> Table:
     """Return the requested columns, read by another process.
 
-    name: of the format, for people. child: the reader's file. limit: of the values.
-    Raises ValueError with column, shape and expectation.
+    name: of the format. limit: of the values. Raises ValueError with column, shape and expectation.
     """
     places = json.dumps([{"column": column, **asdict(place_of(column))} for column in columns])
     environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "ARROW_DEFAULT_MEMORY_POOL": "system"}
-    command = [sys.executable, "-I", str(PROGRAM), str(child), str(path.absolute()), str(limit), places]
+    command = [sys.executable, "-I", str(PROGRAM), name, str(path.absolute()), str(limit), places]
     with tempfile.TemporaryFile() as output:
         try:
             code = subprocess.run(

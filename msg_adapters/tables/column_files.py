@@ -120,7 +120,6 @@ def _vector(column: str, values: Any) -> FloatArray:
     return np.ascontiguousarray(values.ravel(), np.float64)
 
 
-MAT, PARQUET = (Path(__file__).with_name(f"_{name}_reader.py") for name in ("mat", "parquet"))
 HDF5 = b"\x89HDF\r\n\x1a\n"
 _MAT_HEADER = 128
 """Bytes before the first variable."""
@@ -135,7 +134,7 @@ def read_mat(path: Path, wanted: Wanted) -> Table:
             "MAT file of version 7.3 (HDF5), expected version 7: save(…, '-v7') in MATLAB, or docs/import.md"
         )
     _refuse_cut_off(path)
-    return read_apart("MAT", MAT, LARGEST, path, wanted.columns)
+    return read_apart("MAT", LARGEST, path, wanted.columns)
 
 
 def _refuse_cut_off(path: Path) -> None:
@@ -162,7 +161,7 @@ def read_parquet(path: Path, wanted: Wanted) -> Table:
         raise ValueError(
             "Parquet needs the package pyarrow, which is not installed: pip install 'rsea_ros[fleet]'"
         )
-    return read_apart("Parquet", PARQUET, LARGEST, path, wanted.columns)
+    return read_apart("Parquet", LARGEST, path, wanted.columns)
 
 
 READERS: Mapping[str, Callable[[Path, Wanted], Table]] = {

@@ -14,9 +14,9 @@ import pytest
 from bad_input import forked
 from map_files import CSV, MAP
 
-from msg_adapters.tables import child, column_files, import_record, load_map
+from msg_adapters.tables import child, import_record, load_map
 
-READERS = str(column_files.MAT), str(column_files.PARQUET)
+PROGRAM = str(child.PROGRAM)
 
 
 @pytest.fixture(autouse=True)
@@ -24,15 +24,15 @@ def readers_in_forks(monkeypatch):
     """Run readers in forks that have imported scipy and pyarrow, without limits: 0.2 s of CPU less each."""
 
     def run(command, stdout, **options):
-        program, reader, path, limit, places = command[-5:]
-        if reader not in READERS:
+        program, kind, path, limit, places = command[-5:]
+        if program != PROGRAM:
             return subprocess.run(command, stdout=stdout, **options)
 
         def read():
             os.dup2(stdout.fileno(), 1)
             with open(1, "w") as sys.stdout:
                 resource.setrlimit = lambda *limit: None  # this process may have more memory already
-                runpy.run_path(program)["main"](runpy.run_path(reader), path, int(limit), json.loads(places))
+                runpy.run_path(program)["main"](kind, path, int(limit), json.loads(places))
 
         return SimpleNamespace(returncode=forked(read))
 

@@ -72,7 +72,7 @@ def test_version_7_3_is_named(tmp_path, head):
 def test_a_reader_that_fails_is_one_line(tmp_path, monkeypatch, program, message):
     (tmp_path / "child.py").write_text(program)
     savemat(tmp_path / "run.mat", {"x": np.arange(5.0)})
-    monkeypatch.setattr(column_files, "MAT", tmp_path / "child.py")
+    monkeypatch.setattr(child, "PROGRAM", tmp_path / "child.py")
     monkeypatch.setattr(child, "SECONDS", 0.3 if "while" in program else 20.0)
     with pytest.raises(ImportMapError, match=message):
         read_columns(tmp_path / "run.mat", ["x"])
