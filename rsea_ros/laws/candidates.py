@@ -51,18 +51,14 @@ def periods(angle: FloatArray, torque: FloatArray, factor: FloatArray | None = N
     return [interpolate_peak(cycles, level, k) * 2.0 * math.pi / travel for k in peaks(level, apart=16)]
 
 
-def lines(t: FloatArray, residual: FloatArray) -> list[float]:
-    """Return the sharpest line of a residual's spectrum over time, Hz, in a list."""
-    rate, bins, level = stamped_density(t, residual, len(residual))
-    level = np.where((bins > _LOWEST) & (bins < _HIGHEST * rate), level, 0.0)
-    return [interpolate_peak(bins, level, k) for k in peaks(level, apart=8)[:1]]
+def frequencies(t: FloatArray, residual: FloatArray, length: int, apart: int) -> list[float]:
+    """Return the highest peaks of a residual's spectrum over time, Hz, at most two, the highest first.
 
-
-def modes(t: FloatArray, residual: FloatArray) -> list[float]:
-    """Return the frequencies of the highest broad peaks of a residual's spectrum, Hz, at most two."""
-    rate, bins, level = stamped_density(t, residual, 1024)
+    length: samples of a segment; of a short one only broad peaks are seen. apart: bins between two.
+    """
+    rate, bins, level = stamped_density(t, residual, length)
     level = np.where((bins > _LOWEST) & (bins < _HIGHEST * rate), level, 0.0)
-    return [interpolate_peak(bins, level, k) for k in peaks(level, apart=12)]
+    return [interpolate_peak(bins, level, k) for k in peaks(level, apart=apart)]
 
 
 _DEGREE = 2
@@ -159,9 +155,12 @@ def terms_for(cases: Sequence[CaseModel]) -> tuple[terms.Term, ...]:
     for cycles in wave_numbers(model, "d"):
         made += terms.waves("spring_", "spring", "deflection and position, periodic", "N m/rad", cycles, "d")
     if "ft" in model.places:
-        made += [t for f in sensor_lines(model) for t in terms.hum_terms(f)]
         keep = model.case.mask["ft"]
-        made += terms.mode_terms(modes(model.case.t["ft"][keep], model.residual["ft"][keep]))
+        t, residual = model.case.t["ft"][keep], model.residual["ft"][keep]
+        explained = np.interp(t - model.case.start, model.missing.t, model.missing.answers["ft"])
+        lines = frequencies(t, residual - explained, len(t), apart=8)[:1]
+        made += [term for f in lines for term in terms.hum_terms(f)]
+        made += terms.mode_terms(frequencies(t, residual, 1024, apart=12))
     rigid = model.injector is None
     return tuple(
         t for t in made if t.place in model.places and not (rigid and "d" in (t.over, t.expression[:1]))
@@ -174,15 +173,6 @@ def wave_numbers(model: CaseModel, factor: str = "") -> list[float]:
     at = (np.arange(len(variables.letters["t"])) + (0.5 if model.injector else 0.0)) * variables.step
     theta, size = (np.interp(missing.t, at, variables.letters[n]) for n in ("theta", factor or "theta"))
     return periods(theta, missing.torque, size if factor else None)
-
-
-def sensor_lines(model: CaseModel) -> list[float]:
-    """Return the frequency of the sharpest line in the F/T signal that the mechanics do not explain, Hz."""
-    case = model.case
-    keep = case.mask["ft"]
-    t = case.t["ft"][keep]
-    explained = np.interp(t - case.start, model.missing.t, model.missing.answers["ft"])
-    return lines(t, model.residual["ft"][keep] - explained)
 
 
 def candidates_of(cases: Sequence[CaseModel]) -> list[tuple[TermCandidate, list[FloatArray]]]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from rsea_ros.identification.fit import fit, with_even_clocks, with_noise_of
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Solution
 from rsea_ros.identification.start import joint_start
+from rsea_ros.identification.unknowns import apply
 from rsea_ros.laws import sparse_regression as sparse
 from rsea_ros.laws.candidates import TermCandidate, candidates_of, columns_of
 from rsea_ros.laws.law import Tried
@@ -28,20 +30,35 @@ FITTED = (*TRAIN, *VALIDATION)
 
 @dataclass(frozen=True)
 class Base:
-    """The model whose residual is looked at, fitted to all blocks but the test blocks. cases: all samples."""
+    """A model fitted to all blocks but the test blocks. cases: all samples."""
 
     solution: Solution
     cases: tuple[Case, ...]
-    outputs: list[dict[str, FloatArray]]
 
     @property
     def problem(self) -> Problem:
-        """The base model on all samples."""
+        """The model on all samples."""
         return replace(self.solution.problem, cases=self.cases)
 
+    @property
+    def rig(self) -> Rig:
+        """The rig with the fitted values."""
+        return apply(self.problem.rig, self.problem.unknowns, self.solution.theta)[0]
+
+    @cached_property
+    def outputs(self) -> list[dict[str, FloatArray]]:
+        """The simulated channels of every case."""
+        return self.problem.outputs(self.solution.theta)
+
     def score(self, sets: tuple[int, ...]) -> Score:
-        """Return the base's score on some sets of blocks."""
+        """Return the score on some sets of blocks."""
         return score_on(self.problem, self.cases, sets, self.outputs, DEFAULT.blocks)
+
+    def levels(self) -> tuple[dict[str, float], dict[str, float]]:
+        """Return the RMS of each channel's residual on the test blocks, and its noise."""
+        score = self.score(TEST)
+        noise = {n: float(np.mean([c.noise[n] for c in self.cases if n in c.noise])) for n in score.sums}
+        return {n: score.ratio(n) * noise[n] for n in score.sums}, noise
 
 
 def fitted_base(records: Sequence[Record], rig: Rig) -> Base:
@@ -56,17 +73,7 @@ def fitted_base(records: Sequence[Record], rig: Rig) -> Base:
     start = joint_start(checked[0].record, rig) if rig.loop is not None else None
     solution = fit(parts, rig, start=start)[0]
     whole = replace(solution.problem, cases=problem.cases)
-    outputs = whole.outputs(solution.theta)
-    return Base(solution, with_noise_of(whole, outputs), outputs)
-
-
-def levels_of(
-    problem: Problem, outputs: Sequence[dict[str, FloatArray]], cases: Sequence[Case]
-) -> tuple[dict[str, float], dict[str, float]]:
-    """Return the RMS of each channel's residual on the test blocks, and its noise."""
-    score = score_on(problem, cases, TEST, list(outputs), DEFAULT.blocks)
-    noise = {n: float(np.mean([c.noise[n] for c in cases if n in c.noise])) for n in score.sums}
-    return {n: score.ratio(n) * noise[n] for n in score.sums}, noise
+    return Base(solution, with_noise_of(whole, whole.outputs(solution.theta)))
 
 
 MATTERS = 0.02

@@ -85,13 +85,12 @@ def is_limited(law: laws.Law, letter: str) -> bool:
 
 
 def _variables(law: laws.Law) -> list[str]:
-    lines = []
-    for letter in laws.READS:
-        if letter in laws.letters_of(law):
-            limit = law.ranges[letter] * FARTHER
-            value = _read(law, letter)
-            within = f"min(max({value}, -{limit:.6g}), {limit:.6g})"
-            lines.append(f"{letter} = {within if is_limited(law, letter) else value}")
+    lines, letters = [], laws.letters_of(law)
+    for letter in (n for n in laws.READS if n in letters):
+        limit = law.ranges[letter] * FARTHER
+        value = _read(law, letter)
+        within = f"min(max({value}, -{limit:.6g}), {limit:.6g})"
+        lines.append(f"{letter} = {within if is_limited(law, letter) else value}")
     time = laws.time_letters(law)
     if "t" in time:
         lines.append("t = s[TIME]")
@@ -117,10 +116,8 @@ def _memory(part: laws.FittedTerm, name: str, shape: str, state: int) -> tuple[l
     of, kind = part.term.remembers, part.term.memory
     if kind in ("lag", "heat"):
         value = f"{of} * {of}" if kind == "heat" else of
-        return [
-            f"x[{state}] = lagged(x[{state}], {value}, s[STEP], {shape})",
-            f"{name} = x[{state}]",
-        ], state + 1
+        kept = f"x[{state}] = lagged(x[{state}], {value}, s[STEP], {shape})"
+        return [kept, f"{name} = x[{state}]"], state + 1
     if kind == "ring":
         zeta = part.term.constant
         rung = f"{name} = rung(x, {state}, {of}, s[STEP], {shape}, {zeta:g})"
@@ -133,8 +130,8 @@ def _memory(part: laws.FittedTerm, name: str, shape: str, state: int) -> tuple[l
     if kind == "dahl":
         made = f"bent(x[{state}], {of} - x[{state + 1}], {shape})"
     keep = f"x[{state}], x[{state + 1}] = {name}, {of}"
-    kept = ["if s[COMMIT] == 1.0:", f"    {keep}"] if part.term.place == "spring" else [keep]
-    return [f"{name} = {made}", *kept], state + 2
+    at_commit = ["if s[COMMIT] == 1.0:", f"    {keep}"] if part.term.place == "spring" else [keep]
+    return [f"{name} = {made}", *at_commit], state + 2
 
 
 _WIDE = 10.0
@@ -170,7 +167,7 @@ def _docstring(law: laws.Law, provenance: LawProvenance) -> str:
     seen = "; ".join(f"{_LETTERS[n]}: up to {v:.3g}" for n, v in law.ranges.items() if n in letters)
     bags = "\n".join(f"    {in_docstring(name)}  sha256 {digest}" for name, digest in provenance.bags.items())
     kept = "its last value" if law.is_learnt else f"the value at {FARTHER:g} times that range"
-    limited = law.is_learnt or any(is_limited(law, n) for n in laws.letters_of(law))
+    limited = law.is_learnt or any(is_limited(law, n) for n in letters)
     beyond = f" Beyond it the law keeps {kept}." if limited else ""
     reach = [f"Seen in the data: {seen}.{beyond}"] if seen else []
     lines = [

@@ -8,15 +8,15 @@ from pathlib import Path
 import numpy as np
 
 from rsea_ros.diagnosis.candidate import on_blocks
-from rsea_ros.diagnosis.data_split import TRAIN, VALIDATION
 from rsea_ros.diagnosis.score import Score
 from rsea_ros.diagnosis.settings import DEFAULT
 from rsea_ros.effects.catalogue import lend
 from rsea_ros.effects.effect import Claims, Effect, Parity
 from rsea_ros.identification.confidence import confidence_of, interval
-from rsea_ros.identification.problem import Case, Problem
-from rsea_ros.identification.solver import Solution, solve
-from rsea_ros.identification.unknowns import apply, start_vector, unknowns_of_effect
+from rsea_ros.identification.problem import Case
+from rsea_ros.identification.solver import solve
+from rsea_ros.identification.unknowns import start_vector, unknowns_of_effect
+from rsea_ros.laws.choice import FITTED, Base
 from rsea_ros.laws.effect_source import LawProvenance, source_of
 from rsea_ros.laws.law import FigurePoints, Law, WrittenLaw, letters_of
 from rsea_ros.laws.variables import case_model
@@ -76,10 +76,9 @@ _ITERATIONS = 12
 
 
 @dataclass(frozen=True)
-class Refined:
-    """A problem with laws acting, fitted. ci95: of every unknown by name."""
+class Refined(Base):
+    """A model with laws acting. ci95: of every unknown by name."""
 
-    solution: Solution
     ci95: Mapping[str, tuple[float, float]]
 
     def parameters(self, name: str) -> dict[str, float]:
@@ -97,28 +96,22 @@ def effect_from(source: str, name: str) -> Effect:
         return plugin_constant("law", str(path), "EFFECT", Effect)
 
 
-def with_laws(
-    problem: Problem, laws: Sequence[tuple[Effect, Mapping[str, float]]], held: frozenset[str] = frozenset()
-) -> Problem:
-    """Return a problem with laws acting and their parameters unknown; not those of `held`."""
-    settings = [EffectSetting(e.name, dict(p)) for e, p in laws]
-    rig = problem.rig.with_effects(*problem.rig.effects, *settings)
-    more = [u for e, p in laws for u in unknowns_of_effect(e, p, held)]
-    return replace(problem, rig=rig, unknowns=(*problem.unknowns, *more))
-
-
 def refine(
-    base: Solution, cases: Sequence[Case], weights: Score, laws: Sequence[tuple[Effect, Mapping[str, float]]],
+    base: Base, weights: Score, laws: Sequence[tuple[Effect, Mapping[str, float]]],
     held: frozenset[str] = frozenset(),
 ) -> Refined:  # fmt: skip
     """Fit a base model's values and its laws' parameters to all blocks but the test blocks.
 
-    weights: a score whose misfit counts as noise. Creep velocities stay as they are.
+    weights: a score whose misfit counts as noise. held: parameters that stay as they are, as creep
+    velocities do.
     """
-    creeps = {f"{e.name}.creep_velocity" for e, _ in laws}
-    problem = with_laws(base.problem, laws, frozenset(creeps) | held)
-    start = np.concatenate([base.theta, start_vector(problem.unknowns[len(base.theta) :])])
-    blocks = on_blocks(problem, cases, (*TRAIN, *VALIDATION), weights, DEFAULT.blocks)
+    held |= {f"{e.name}.creep_velocity" for e, _ in laws}
+    before = base.problem
+    rig = before.rig.with_effects(*before.rig.effects, *(EffectSetting(e.name, dict(p)) for e, p in laws))
+    more = [u for e, p in laws for u in unknowns_of_effect(e, p, held)]
+    problem = replace(before, rig=rig, unknowns=(*before.unknowns, *more))
+    start = np.concatenate([base.solution.theta, start_vector(more)])
+    blocks = on_blocks(problem, base.cases, FITTED, weights, DEFAULT.blocks)
     solution = solve(blocks, start, iterations=_ITERATIONS, gain=1e-4)
     confidence = confidence_of(solution)
     sd = np.sqrt(np.diag(confidence.covariance))
@@ -126,7 +119,7 @@ def refine(
         u.name: interval(u, float(at), float(s))
         for u, at, s in zip(solution.problem.unknowns, solution.theta, sd, strict=True)
     }
-    return Refined(solution, ci95)
+    return Refined(solution, base.cases, ci95)
 
 
 _POINTS = 4000
@@ -152,8 +145,8 @@ def draft_of(law: Law) -> Draft:
 
 
 def finish_laws(
-    drafts: Sequence[Draft], refined: Refined, cases: Sequence[Case], provenance: LawProvenance | None,
-    gain: float, ci95: tuple[float, float],
+    drafts: Sequence[Draft], refined: Refined, provenance: LawProvenance | None, gain: float,
+    ci95: tuple[float, float],
 ) -> list[WrittenLaw]:  # fmt: skip
     """Return the laws as they were fitted, with their files."""
     where = provenance or _NO_PROVENANCE
@@ -161,8 +154,6 @@ def finish_laws(
         f"Gain on blocks of time that took part in no fit and no choice: {100 * gain:.1f} % "
         f"(95 %: {100 * ci95[0]:.1f} to {100 * ci95[1]:.1f} %)."
     )
-    problem = replace(refined.solution.problem, cases=tuple(cases))
-    rig = apply(problem.rig, problem.unknowns, refined.solution.theta)[0]
     written = []
     for draft in drafts:
         name = draft.effect.name
@@ -171,21 +162,21 @@ def finish_laws(
             continue
         intervals = {n: refined.ci95[f"{name}.{n}"] for n in values if f"{name}.{n}" in refined.ci95}
         law = draft.law if draft.law.is_learnt else draft.law.with_parameters(values, intervals)
-        shown = torque_points(problem, refined, law, values)
+        shown = torque_points(refined, law, values)
         whole = len(law.parts) == len(draft.law.parts)
         effect = draft.effect if whole else draft_of(law).effect
         with lend(effect):
-            claims = claims_of(law, effect, rig, cases[0])
+            claims = claims_of(law, effect, refined.rig, refined.cases[0])
         written.append(
             WrittenLaw(law, effect, source_of(law, claims, replace(where, gain=held_out_gain)), claims, shown)
         )
     return written
 
 
-def torque_points(problem: Problem, refined: Refined, law: Law, values: dict[str, float]) -> FigurePoints:
+def torque_points(refined: Refined, law: Law, values: dict[str, float]) -> FigurePoints:
     """Return the missing torque of the fitted model without a law, over the law's variable."""
     off = {n: 0.0 if n in _sizes(law) else v for n, v in values.items()}
-    rig = problem.rig
+    problem, rig = refined.problem, refined.problem.rig
     others = [e if e.name != law.name else EffectSetting(law.name, off) for e in rig.effects]
     names = [i for i, u in enumerate(problem.unknowns) if not u.name.startswith(f"{law.name}.")]
     rest = replace(problem, rig=rig.with_effects(*others), unknowns=tuple(problem.unknowns[i] for i in names))

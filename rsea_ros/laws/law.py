@@ -165,23 +165,18 @@ def words_of(expression: str) -> set[str]:
 
 
 def time_letters(law: Law) -> set[str]:
-    words = {w for part in law.parts for w in words_of(part.term.expression)}
-    if law.curve is not None:
-        words |= {law.curve.over, law.curve.factor}
-    return words & {"t", "share"}
+    return _names_in(law) & {"t", "share"}
 
 
 def letters_of(law: Law) -> set[str]:
     """Return the letters of the variables that a law reads."""
-    used: set[str] = set()
-    for part in law.parts:
-        used |= words_of(part.term.expression) & set(READS)
-        used |= {"w"} if part.term.friction else set()
-        used |= {part.term.remembers} if part.term.memory else set()
-    if law.curve is not None:
-        used |= {law.curve.over, law.curve.factor} & set(READS)
-        used |= {"w"} if law.curve.factor == "w" else set()
-    return used
+    remembered = {part.term.remembers for part in law.parts if part.term.memory}
+    return (_names_in(law) | remembered | ({"w"} if law.is_friction else set())) & set(READS)
+
+
+def _names_in(law: Law) -> set[str]:
+    names = {law.curve.over, law.curve.factor} if law.curve is not None else set()
+    return names.union(*(words_of(part.term.expression) for part in law.parts))
 
 
 def ranges_of(law: Law, letters: Mapping[str, np.ndarray]) -> dict[str, float]:

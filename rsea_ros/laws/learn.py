@@ -7,12 +7,11 @@ import numpy as np
 
 from rsea_ros.diagnosis.criteria import is_at_floor
 from rsea_ros.diagnosis.data_split import TEST
-from rsea_ros.diagnosis.score import Score, gain_of as gain_of_blocks, score_on
+from rsea_ros.diagnosis.score import Score, gain_of as gain_of_blocks
 from rsea_ros.diagnosis.settings import DEFAULT
 from rsea_ros.documents.wording import list_names
 from rsea_ros.effects.catalogue import lend
 from rsea_ros.identification.solver import one_blas_thread
-from rsea_ros.identification.unknowns import apply
 from rsea_ros.laws import choice as choices
 from rsea_ros.laws.candidates import SPLINES, TermCandidate, basis_of, spline_knots
 from rsea_ros.laws.effect_source import LawProvenance
@@ -31,8 +30,8 @@ _NEEDED = 0.03
 def refined_laws(base: choices.Base, drafts: Sequence[Draft]) -> Refined:
     """Fit the laws in the simulation, in units of their residual, and drop needless terms."""
     starts = [(d.effect, d.law.parameters) for d in drafts]
-    refined = refine(base.solution, base.cases, base.score(choices.FITTED), starts)
-    weights = _score(base, refined, choices.FITTED)
+    refined = refine(base, base.score(choices.FITTED), starts)
+    weights = refined.score(choices.FITTED)
     refined = _again(base, drafts, refined, weights, frozenset())
     held: frozenset[str] = frozenset()
     while (names := _least(drafts, refined, held)) is not None:
@@ -48,11 +47,12 @@ def _again(
 ) -> Refined:
     """Fit from a fit on, with some parameters held: coefficients at zero, shapes where they are."""
     nearer = replace(base.solution, theta=refined.solution.theta[: len(base.solution.theta)])
+    base = replace(base, solution=nearer)
     starts = [
         (e, refined.parameters(e.name) | {n: 0.0 for n, _ in law.names if f"{e.name}.{n}" in held})
         for e, law in ((d.effect, d.law) for d in drafts)
     ]
-    return refine(nearer, base.cases, weights, starts, held)
+    return refine(base, weights, starts, held)
 
 
 def _least(drafts: Sequence[Draft], refined: Refined, held: frozenset[str]) -> frozenset[str] | None:
@@ -71,17 +71,6 @@ def _least(drafts: Sequence[Draft], refined: Refined, held: frozenset[str]) -> f
     effect, c, s = min(terms, key=significance)
     shared = any(other != c and shape == s for e, other, shape in terms if e == effect)
     return frozenset({f"{effect}.{c}", *([f"{effect}.{s}"] if s and not shared else [])})
-
-
-def _score(base: choices.Base, refined: Refined, sets: tuple[int, ...]) -> Score:
-    """Return the score of refined laws on some sets of blocks."""
-    problem = replace(refined.solution.problem, cases=base.cases)
-    return score_on(problem, base.cases, sets, problem.outputs(refined.solution.theta), DEFAULT.blocks)
-
-
-def gain_on_tests(base: choices.Base, refined: Refined) -> tuple[float, tuple[float, float]]:
-    """Return the gain on the test blocks with its interval."""
-    return gain_of(base.score(TEST), _score(base, refined, TEST))
 
 
 def gain_of(without: Score, with_it: Score) -> tuple[float, tuple[float, float]]:
@@ -193,8 +182,8 @@ def learn(
 
 def nothing_left(base: choices.Base, records: Sequence[Record]) -> LawResult:
     """Return the result where the base model is at the noise floor."""
-    before, noise = choices.levels_of(base.problem, base.outputs, base.cases)
-    rig = apply(base.problem.rig, base.problem.unknowns, base.solution.theta)[0]
+    before, noise = base.levels()
+    rig = base.rig
     duration = sum(c.duration for c in base.cases)
     return LawResult(rig.name, tuple(r.source for r in records), duration, rig, rig,
                      (), (), (), 0.0, (0.0, 0.0), 0.0, before, before, noise, at_floor=True)  # fmt: skip
@@ -212,18 +201,14 @@ def _result(
     drafts = [draft_of(law) for law in laws]
     with lend(*(d.effect for d in drafts)):
         refined = refined_laws(base, drafts) if drafts else None
-        gain, ci95 = gain_on_tests(base, refined) if refined else (0.0, (0.0, 0.0))
+        gain, ci95 = gain_of(base.score(TEST), refined.score(TEST)) if refined else (0.0, (0.0, 0.0))
         if refined is None or not (gain >= choices.MATTERS and ci95[0] > 0.0):
             return replace(nothing_left(base, records), dependences=tuple(depends), at_floor=False,
                            tried=choices.summarize_models(search, choice, ()))  # fmt: skip
-        before, noise = choices.levels_of(base.problem, base.outputs, base.cases)
-        problem = replace(refined.solution.problem, cases=base.cases)
-        after = choices.levels_of(problem, problem.outputs(refined.solution.theta), base.cases)[0]
-        share = share_of(before, after, noise)
-        written = finish_laws(drafts, refined, base.cases, provenance, gain, ci95)
-        rigs = [
-            apply(s.problem.rig, s.problem.unknowns, s.theta)[0] for s in (base.solution, refined.solution)
-        ]
+        before, noise = base.levels()
+        after = refined.levels()[0]
+        written = finish_laws(drafts, refined, provenance, gain, ci95)
+        rigs = base.rig, refined.rig
     acting = {e.name for e in rigs[0].effects}
     with_files = (EffectSetting(w.law.name, w.law.parameters) for w in written)
     return LawResult(
@@ -231,6 +216,6 @@ def _result(
         duration=sum(c.duration for c in base.cases), base_rig=rigs[0],
         rig=rigs[1].with_effects(*(e for e in rigs[1].effects if e.name in acting), *with_files),
         dependences=tuple(depends), tried=choices.summarize_models(search, choice, choice.taken),
-        laws=tuple(written), gain=gain, gain_ci95=ci95, share=share, before=before, after=after, noise=noise,
-        at_floor=False,
+        laws=tuple(written), gain=gain, gain_ci95=ci95, share=share_of(before, after, noise),
+        before=before, after=after, noise=noise, at_floor=False,
     )  # fmt: skip

@@ -54,15 +54,16 @@ class Gram:
     @cached_property
     def by_set(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """The sums a, b and rr of each set of blocks, channels apart."""
-        sets = range(4)
-        sums = ([v[groups_of((k,))].sum(axis=0) for k in sets] for v in (self.a, self.b, self.rr))
-        a, b, rr = (np.array(v) for v in sums)
+        sums = (self.a, self.b, self.rr)
+        a, b, rr = (np.array([v[groups_of((k,))].sum(axis=0) for k in range(4)]) for v in sums)
         return a, b, rr
 
     @cached_property
     def penalty(self) -> FloatArray:
-        """The squared priors of the rig's columns, in the columns' scale."""
-        return np.asarray((self.prior / self.scale[: len(self.prior)]) ** 2)
+        """The squared priors of the rig's columns, in the columns' scale; zero for the others."""
+        penalty = np.zeros(len(self.scale))
+        penalty[: len(self.prior)] = (self.prior / self.scale[: len(self.prior)]) ** 2
+        return penalty
 
     @property
     def nominal(self) -> IntArray:
@@ -84,13 +85,11 @@ class Gram:
         b = self.b[groups].sum(axis=0)[:, which]
         rr, count = self.rr[groups].sum(axis=0), np.maximum(self.count[groups].sum(axis=0), 1.0)
         beta = np.zeros(len(which))
-        penalty = np.zeros(len(which))
-        penalty[: len(self.prior)] = self.penalty
         for _ in range(_REWEIGHTINGS):
             squares = rr - 2.0 * b @ beta + np.einsum("i,cij,j->c", beta, a, beta)
             weight = 1.0 / np.maximum(squares / count, 1.0)
             normal = np.tensordot(weight, a, 1)
-            normal = normal + np.diag(penalty + ridge * np.diag(normal) + 1e-30)
+            normal = normal + np.diag(self.penalty[which] + ridge * np.diag(normal) + 1e-30)
             beta = np.linalg.solve(normal, weight @ b)
         return np.asarray(beta)
 
@@ -186,9 +185,7 @@ def fold_sums(gram: Gram, weight: FloatArray) -> Folded:
     whole_a, whole_b = np.sum(a, axis=0), np.sum(b, axis=0)
     inside = [(np.asarray(whole_a - a_k), np.asarray(whole_b - b_k)) for a_k, b_k in zip(a, b, strict=True)]
     outside = [(a[i], b[i], float(squares[k] @ weight)) for i, k in enumerate(FOLDS)]
-    penalty = np.zeros(gram.b.shape[2])
-    penalty[: len(gram.prior)] = gram.penalty
-    return Folded(tuple(inside), tuple(outside), penalty)
+    return Folded(tuple(inside), tuple(outside), gram.penalty)
 
 
 def paths(

@@ -96,7 +96,7 @@ def test_the_gain_is_measured_on_blocks_that_took_part_in_nothing(learn_of):
 
 @pytest.mark.parametrize(("gain", "ci95"), [(0.12, (-0.01, 0.3))])
 def test_a_law_that_is_not_surely_better_is_not_written(monkeypatch, gain, ci95):
-    monkeypatch.setattr(rsea_ros.laws.learn, "gain_on_tests", lambda *_: (gain, ci95))
+    monkeypatch.setattr(rsea_ros.laws.learn, "gain_of", lambda *_: (gain, ci95))
     bench = drawn_bench(np.random.default_rng(3)).with_values(quadratic_drag=12.0)
     result = learn([record_run(bench, 3, "chirp_noise", 4.0)], load_rig("paper_high_impedance"))
     assert result.laws == () and result.gain == 0.0 and result.tried
