@@ -15,11 +15,11 @@ import numpy as np
 
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.effects.signal_table import Port
-from rsea_ros.experiment.hypothesis import NOTHING, Hypothesis, motion, run_case
+from rsea_ros.experiment.hypothesis import NOTHING, Hypothesis, run_case
 from rsea_ros.experiment.proposal import DesignRequest, Proposal
 from rsea_ros.experiment.run_design import propose
-from rsea_ros.experiment.run_shape import RunLimits, largest_share, of_command, of_response
-from rsea_ros.experiment.separation import noise_by_channel
+from rsea_ros.experiment.run_shape import RunLimits
+from rsea_ros.experiment.separation import noise_by_channel, share_of_limits
 from rsea_ros.identification.excitation import ramp_ends
 from rsea_ros.identification.problem import Problem
 from rsea_ros.identification.solver import Map, serial, solve
@@ -54,11 +54,6 @@ class Bound:
     rate: FloatArray
     values: Mapping[str, float]
 
-    @property
-    def is_hopeless(self) -> bool:
-        """Whether no run of that length separates the two."""
-        return self.most < HOPELESS
-
 
 def bound(
     true: Hypothesis,
@@ -92,10 +87,8 @@ def _sine(
     command = limits.torque * ramp_ends(
         bias + amplitude * np.sin(2.0 * np.pi * frequency * t), round(0.2 * rate)
     )
-    rig = true.rig_at(true.if_there())
     for _ in range(3):
-        peaks = of_command(command, rate) | of_response(command, motion(rig, command, rate))
-        share = largest_share(peaks, limits)
+        share = share_of_limits(true, command, rate, limits)
         if share <= 1.0:
             break
         command = command * (0.98 / share if np.isfinite(share) else 0.3)
@@ -253,7 +246,7 @@ def _prove(
         (i, j, bound(i, j, asked.limits, LONGEST_OF_ALL, noise, asked.rate, run)) for i, j in ((a, b), (b, a))
     ]
     true, rival, larger = max(both, key=lambda item: item[2].most)
-    if not larger.is_hopeless:
+    if larger.most >= HOPELESS:
         return None
     effects = [effect_named(e.name) for h in (a, b) for e in h.problem.rig.effects]
     is_linear = all(e.claims.amplitude_exponent == 1.0 for e in effects)

@@ -178,6 +178,11 @@ class _Session:
         """The noise by channel, as the first record shows it."""
         return self.weighing.cases[0].noise
 
+    @property
+    def played(self) -> list[Proposal]:
+        """The runs so far."""
+        return [r.proposal for r in self.rounds if r.proposal is not None]
+
     def conclude(
         self, end: End, proofs: tuple[Proof, ...] = (), why: str = "", shared: SharedName | None = None
     ) -> CampaignOutcome:
@@ -225,7 +230,7 @@ class Campaign:
     def _round(self, session: _Session) -> CampaignOutcome | None:
         """Design a run and have it played; return the outcome, None where the loop continues."""
         weighing = session.weighing
-        end, spent = self.known_end(weighing), self._budget_end(session.rounds)
+        end, spent = self.known_end(weighing), self._budget_end(session.played)
         richer = self._richer(session) if end == "confirmed" else []
         if end and not richer:
             return session.conclude(end)
@@ -251,10 +256,10 @@ class Campaign:
 
     def _design(self, session: _Session, possible: Sequence[Hypothesis], is_test: bool) -> Proposal:
         """Return the next run; the longest where a shorter one is not worth playing."""
-        noise, rounds = session.noise, session.rounds
-        asked = replace(self._asked(rounds), test=self.rules.shown if is_test else 0.0)
+        noise, played = session.noise, session.played
+        asked = replace(self._asked(played), test=self.rules.shown if is_test else 0.0)
         proposal = self.choose(possible, asked, noise, self.run, self.tell)
-        if is_test or self._is_worth(proposal, rounds) or proposal.duration >= asked.longest:
+        if is_test or self._is_worth(proposal, played) or proposal.duration >= asked.longest:
             return proposal
         return self.choose(possible, replace(asked, shortest=asked.longest), noise, self.run, self.tell)
 
@@ -263,11 +268,11 @@ class Campaign:
     ) -> CampaignOutcome | None:
         """Return the outcome where no run within the limits would help, None where this one may."""
         may_help = self._may_show if is_test else self._is_worth
-        if may_help(proposal, session.rounds):
+        if may_help(proposal, session.played):
             return None
         proofs = proofs_of(possible, proposal.hopeless, self.asked, session.noise, self.run)
         is_covered = any(p.covers_all and possible[0].name in p.pair for p in proofs)
-        if is_test or is_covered or self._played_longest(session.rounds):
+        if is_test or is_covered or self._played_longest(session.played):
             return self._undecidable(session, possible, proofs)
         return None
 
@@ -286,19 +291,20 @@ class Campaign:
 
         Empty without such. A run tests a cause that it would rather have shown than not, were it true.
         """
-        weighing, played = session.weighing, [r.proposal for r in session.rounds if r.proposal is not None]
-        seen = {n for p in played for n, c in zip(p.names, p.chances, strict=True) if c >= self.rules.shown}
-        names = set(weighing.richer_by_data(self.rules.by_data)) - seen
+        weighing = session.weighing
+        chances = (pair for p in session.played for pair in zip(p.names, p.chances, strict=True))
+        seen = {name for name, chance in chances if chance >= self.rules.shown}
+        names = set(weighing.near_by_data(self.rules.by_data, richer=True)) - seen
         rivals = [h for h in weighing.hypotheses(self.rules.possible) if h.name in names]
         return [weighing.hypotheses()[0], *rivals] if rivals else []
 
-    def _may_show(self, proposal: Proposal, rounds: Sequence[Round]) -> bool:
+    def _may_show(self, proposal: Proposal, played: Sequence[Proposal]) -> bool:
         """Return whether a test would rather show a richer cause than not.
 
         One with a smaller chance is played too, unless a run of the longest length was.
         """
         chance = max(proposal.chances[1:])
-        return chance >= self.rules.shown or (chance >= self.rules.worth and not self._played_longest(rounds))
+        return chance >= self.rules.shown or (chance >= self.rules.worth and not self._played_longest(played))
 
     def _undecidable(
         self, session: _Session, possible: Sequence[Hypothesis], proofs: tuple[Proof, ...]
@@ -310,33 +316,30 @@ class Campaign:
         shared = shared_name(remain, asked, session.noise, self.run)
         return session.conclude("undecidable", proofs, shared=shared)
 
-    def _is_worth(self, proposal: Proposal, rounds: Sequence[Round]) -> bool:
+    def _is_worth(self, proposal: Proposal, played: Sequence[Proposal]) -> bool:
         """Return whether a run may decide, or lessens the doubt that holds larger ones back."""
-        return proposal.resolved >= self.rules.worth or self._widens(proposal, rounds)
+        return proposal.resolved >= self.rules.worth or self._widens(proposal, played)
 
-    def _widens(self, proposal: Proposal, rounds: Sequence[Round]) -> bool:
+    def _widens(self, proposal: Proposal, played: Sequence[Proposal]) -> bool:
         """Return whether a run is the largest so far and only doubt holds it back: it lessens the doubt."""
-        before = [r.proposal.peaks.at_level["torque"] for r in rounds if r.proposal is not None]
-        now = proposal.peaks
-        is_larger = now.at_level["torque"] > self.rules.larger * max(before, default=0.0)
+        before, now = max((p.peaks.at_level["torque"] for p in played), default=0.0), proposal.peaks
+        is_larger = now.at_level["torque"] > self.rules.larger * before
         return is_larger and largest_share(now.expected, self.asked.limits) < self.rules.held_back
 
-    def _played_longest(self, rounds: Sequence[Round]) -> bool:
+    def _played_longest(self, played: Sequence[Proposal]) -> bool:
         """Return whether a run of the longest length was played, to a tenth."""
-        played = (r.proposal.duration for r in rounds if r.proposal is not None)
-        return max(played, default=0.0) > 0.9 * self.asked.longest
+        return max((p.duration for p in played), default=0.0) > 0.9 * self.asked.longest
 
-    def _asked(self, rounds: Sequence[Round]) -> DesignRequest:
+    def _asked(self, played: Sequence[Proposal]) -> DesignRequest:
         """Return the request for the next run, within the budget.
 
         At least as long as all runs before it, which did not decide.
         """
-        played = sum(r.proposal.duration for r in rounds if r.proposal is not None)
-        longest = min(self.asked.longest, self.budget.seconds - played)
-        return replace(self.asked, shortest=min(max(self.asked.shortest, played), longest), longest=longest)
+        seconds = sum(p.duration for p in played)
+        longest = min(self.asked.longest, self.budget.seconds - seconds)
+        return replace(self.asked, shortest=min(max(self.asked.shortest, seconds), longest), longest=longest)
 
-    def _budget_end(self, rounds: Sequence[Round]) -> End | None:
-        played = [r.proposal for r in rounds if r.proposal is not None]
+    def _budget_end(self, played: Sequence[Proposal]) -> End | None:
         seconds, energy = sum(p.duration for p in played), sum(p.energy for p in played)
         budget = self.budget
         next_run = max(self.asked.shortest, max(FEWEST.values()) / self.asked.rate)

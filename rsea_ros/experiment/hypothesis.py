@@ -17,7 +17,7 @@ from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Map, jacobian, serial
 from rsea_ros.identification.unknowns import apply, bounds_of
 from rsea_ros.model.drive import coarser, drive_from
-from rsea_ros.model.rig import Rig, Sensor
+from rsea_ros.model.rig import Rig
 from rsea_ros.model.simulation import simulate_drive
 from rsea_ros.records.record import SENSED, Channel, FloatArray, Record
 
@@ -194,13 +194,6 @@ class Response:
     likely: FloatArray
     predicted: FloatArray
     slope: FloatArray
-
-
-def noise_of(rig: Rig, channel: str, measured: Mapping[str, float] | None = None) -> float:
-    """Return the noise of a channel: as measured, else as the rig states it with q / sqrt(12)."""
-    if measured and channel in measured:
-        return measured[channel]
-    return max(rig.sensors.get(channel, Sensor()).level, 1e-9)
 
 
 def run_case(command: FloatArray, rate: float, noise: Mapping[str, float], *, is_quick: bool = False) -> Case:

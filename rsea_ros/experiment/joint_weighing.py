@@ -196,21 +196,11 @@ HOPELESS = 1e-6
 
 
 @dataclass(frozen=True)
-class WeighedCause:
-    """A cause fitted to all records. log_evidence: see above; left: RMS over the noise."""
-
-    name: str
-    solution: Solution
-    log_evidence: float
-    left: float
-
-
-@dataclass(frozen=True)
 class RunWeighing:
     """The result from all records. probability: by cause, for those not dropped before; they sum to 1."""
 
     cases: tuple[Case, ...]
-    fits: Mapping[str, WeighedCause]
+    fits: Mapping[str, Solution]
     probability: Mapping[str, float]
     scale: float
 
@@ -222,24 +212,15 @@ class RunWeighing:
     @property
     def left(self) -> float:
         """RMS over the noise that the best cause leaves."""
-        return self.fits[self.best].left
+        return self.fits[self.best].rms
 
-    def near_by_data(self, least: float) -> list[str]:
+    def near_by_data(self, least: float, *, richer: bool = False) -> list[str]:
         """Return the causes of no more parameters than the best that fit less than `least` worse, in S.
 
-        By the data alone, without their priors.
+        By the data alone, without their priors. richer: those of more parameters. A cause that contains the
+        best always fits as well: what it adds may be absent, or not shown so far.
         """
-        return self._by_data(least, richer=False)
-
-    def richer_by_data(self, least: float) -> list[str]:
-        """Return the causes of more parameters than the best that fit less than `least` worse, in S.
-
-        A cause that contains the best always does: what it adds may be absent, or not shown so far.
-        """
-        return self._by_data(least, richer=True)
-
-    def _by_data(self, least: float, *, richer: bool) -> list[str]:
-        fits = {n: f.solution for n, f in self.fits.items()}
+        fits = dict(self.fits)
         best = fits.pop(self.best)
         most = power(best.residual) + least * self.scale
         as_well = [n for n, s in fits.items() if power(s.residual) < most]
@@ -251,7 +232,7 @@ class RunWeighing:
         return [self._hypothesis(n) for n in names if self.probability[n] >= least]
 
     def _hypothesis(self, name: str) -> Hypothesis:
-        solution = self.fits[name].solution
+        solution = self.fits[name]
         information = information_of(solution, self.scale)
         problem = replace(solution.problem, cases=())
         hypothesis = Hypothesis(name, problem, solution.theta, information, self.probability[name])
@@ -298,23 +279,15 @@ def weigh(
     names = [NOTHING, *causes]
     if before is not None:
         names = [n for n in names if before.probability.get(n, 0.0) > HOPELESS]
-    nominal = fit_cause(NOTHING, problem_of(NOTHING, rig, cases), _where(before, NOTHING), {}, run)
+    ended = {n: fit.theta for n, fit in before.fits.items()} if before is not None else {}
+    nominal = fit_cause(NOTHING, problem_of(NOTHING, rig, cases), ended.get(NOTHING), {}, run)
     near = dict(zip((u.name for u in nominal.problem.unknowns), nominal.theta, strict=True))
     solutions = {NOTHING: nominal}
     for name in (n for n in names if n != NOTHING):
-        solutions[name] = fit_cause(name, problem_of(name, rig, cases), _where(before, name), near, run)
-    return _weigh(repeat_fits(solutions, run), cases)
-
-
-def _where(before: RunWeighing | None, name: str) -> FloatArray | None:
-    """Return where the fit of a cause ended before, None for one that was not fitted."""
-    return before.fits[name].solution.theta if before is not None and name in before.fits else None
-
-
-def _weigh(solutions: Mapping[str, Solution], cases: tuple[Case, ...]) -> RunWeighing:
-    scale = scale_of(solutions)
-    fits = {n: WeighedCause(n, s, log_evidence(s, scale), s.rms) for n, s in solutions.items()}
-    logs = np.array([f.log_evidence for f in fits.values()])
+        solutions[name] = fit_cause(name, problem_of(name, rig, cases), ended.get(name), near, run)
+    fits = repeat_fits(solutions, run)
+    scale = scale_of(fits)
+    logs = np.array([log_evidence(fit, scale) for fit in fits.values()])
     shares = np.exp(logs - logs.max())
     return RunWeighing(cases, fits, dict(zip(fits, (shares / shares.sum()).tolist(), strict=True)), scale)
 

@@ -14,11 +14,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import ndtr
 
-from rsea_ros.experiment.hypothesis import Hypothesis, Response, motion, noise_of, response, run_case
+from rsea_ros.experiment.hypothesis import Hypothesis, Response, motion, response, run_case
 from rsea_ros.experiment.proposal import DesignRequest
-from rsea_ros.experiment.run_shape import FEWEST, Shape, command_of, largest_share, of_command, of_response
+from rsea_ros.experiment.run_shape import (
+    FEWEST,
+    RunLimits,
+    Shape,
+    command_of,
+    largest_share,
+    of_command,
+    of_response,
+)
 from rsea_ros.identification.problem import Case
 from rsea_ros.identification.solver import Map, descend, jacobian, power, serial
+from rsea_ros.model.rig import Sensor
 from rsea_ros.records.record import MEASURED, BoolArray, FloatArray
 
 INSIDE = 0.9
@@ -42,18 +51,11 @@ class ShapeRater:
         scaled = replace(shape, amplitude=shape.amplitude * size, bias=shape.bias * size)
         command = command_of(scaled, duration, rate, limits.slew)
         for _ in range(3):
-            share = max(self.share(h, command) for h in self.hypotheses)
+            share = max(share_of_limits(h, command, rate, limits) for h in self.hypotheses)
             if share <= INSIDE * 1.05:
                 break
             command = command * (INSIDE / share if math.isfinite(share) else 0.5)
         return command
-
-    def share(self, hypothesis: Hypothesis, command: FloatArray) -> float:
-        """Return the share of the limits that a command uses at the likeliest values."""
-        rate = self.asked.rate
-        rig = hypothesis.rig_at(hypothesis.if_there())
-        peaks = of_response(command, motion(rig, command, rate)) | of_command(command, rate)
-        return largest_share(peaks, self.asked.limits)
 
     def responses(self, command: FloatArray, *, is_quick: bool = True) -> list[Response]:
         """Return the prediction of each hypothesis for a command."""
@@ -65,11 +67,18 @@ class ShapeRater:
         return run_case(command, self.asked.rate, self.noise, is_quick=is_quick)
 
 
+def share_of_limits(hypothesis: Hypothesis, command: FloatArray, rate: float, limits: RunLimits) -> float:
+    """Return the share of the limits that a command uses at the likeliest values."""
+    outputs = motion(hypothesis.rig_at(hypothesis.if_there()), command, rate)
+    return largest_share(of_response(command, outputs) | of_command(command, rate), limits)
+
+
 def noise_by_channel(hypotheses: Sequence[Hypothesis], measured: Mapping[str, float]) -> dict[str, float]:
-    """Return the noise of every channel that the bench measures."""
+    """Return the noise of every channel that the bench measures: as measured, else as the rig states it."""
     rig = hypotheses[0].problem.rig
     listed = [n for n in MEASURED if n in (measured or rig.sensors) and rig.measures(n)]
-    return {n: noise_of(rig, n, measured) for n in listed or ["ft", "position"]}
+    stated = {n: max(rig.sensors.get(n, Sensor()).level, 1e-9) for n in listed or ["ft", "position"]}
+    return {n: measured.get(n, level) for n, level in stated.items()}
 
 
 SURE = float(np.log(19.0))
@@ -101,8 +110,7 @@ def likely_separations(hypotheses: Sequence[Hypothesis], responses: Sequence[Res
 def _row(
     true: FloatArray, i: int, hypotheses: Sequence[Hypothesis], responses: Sequence[Response]
 ) -> FloatArray:
-    pairs = zip(responses, hypotheses, strict=True)
-    rivals = enumerate(pairs)
+    rivals = enumerate(zip(responses, hypotheses, strict=True))
     return np.array([np.inf if i == j else separation(true, r, h.information) for j, (r, h) in rivals])
 
 
@@ -110,8 +118,7 @@ def _row(
 class Refit:
     """A rival fitted to the prediction of another.
 
-    total: S; data: its part from the run, without the cost to the
-    rival of leaving its priors; only the part from the run grows with its length.
+    total: S; data: its part from the run, which alone grows with its length.
     """
 
     total: float

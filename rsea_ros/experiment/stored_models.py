@@ -12,7 +12,7 @@ from rsea_ros.errors import FieldError, ParameterError
 from rsea_ros.experiment.hypothesis import NOTHING, Hypothesis
 from rsea_ros.experiment.joint_weighing import problem_of, vector_at, weights_of
 from rsea_ros.identification.problem import Problem
-from rsea_ros.identification.unknowns import Unknown
+from rsea_ros.identification.unknowns import Unknown, clocks
 from rsea_ros.model.rig import EffectSetting, Quantity, Rig
 from rsea_ros.records.record import SENSED
 from rsea_ros.records.statistics import Z95
@@ -94,8 +94,6 @@ def _hypothesis(model: ModelFile, probability: float) -> Hypothesis:
 
 def _clocks(problem: Problem, rig: Rig) -> tuple[Unknown, ...]:
     """Return the clocks of the sensors that a rig lists; a problem without records has none."""
-    from rsea_ros.identification.unknowns import clocks
-
     listed = [n for n in rig.sensors if rig.measures(n)]
     known = {u.name for u in problem.unknowns}
     return tuple(u for u in clocks(sorted(listed), rig) if u.name not in known)
@@ -120,12 +118,10 @@ def models_of(document: Mapping[str, Any], extended: Rig) -> list[ModelFile]:
     extended: the diagnosis's model.yaml. Without a cause, the rig alone. Raises FieldError naming the field.
     """
     causes = [_cause(c, f"causes[{i}]", extended) for i, c in enumerate(_list(document, "causes"))]
+    places = [(f"alternatives[{i}]", body) for i, body in enumerate(_list(document, "alternatives"))]
     others = [
-        (
-            text(a.get("instead_of", ""), f"alternatives[{i}].instead_of"),
-            _cause(a, f"alternatives[{i}]", extended),
-        )
-        for i, a in enumerate(_list(document, "alternatives"))
+        (text(body.get("instead_of", ""), f"{at}.instead_of"), _cause(body, at, extended))
+        for at, body in places
     ]
     if not causes:
         return [ModelFile(NOTHING, extended, {})]
