@@ -70,18 +70,19 @@ class _Fit:
     sigma: float
 
 
+@dataclass(frozen=True)
 class Fitter:
     """Fits over some looks. scale: standard deviation of the innovations by channel when all is right."""
 
-    def __init__(
-        self, rig: Rig, noise: Noise, hold: float, looks: Sequence[hypo.Look], scale: FloatArray
-    ) -> None:
-        self._rig, self._noise, self._hold = rig, noise, hold
-        self._looks, self._scale = looks, scale
+    rig: Rig
+    noise: Noise
+    hold: float
+    looks: Sequence[hypo.Look]
+    scale: FloatArray
 
     def causes(self, hypotheses: Sequence[hypo.ChangeHypothesis], starts: FloatArray) -> list[ChangeCause]:
         """Return the FINALISTS causes, the most probable first. starts: changes to begin with, (p,)."""
-        before = self._innovations(self._rig)
+        before = self._innovations(self.rig)
         usual = WHITE * float(np.isfinite(before).sum())
         excess = float(cost(before) - usual)
         finalists = self._finalists(hypotheses, starts)
@@ -100,19 +101,14 @@ class Fitter:
 
     def now(self) -> float:
         """Return the cost of the unchanged rig on the looks; zero without any."""
-        return cost(self._innovations(self._rig)) if self._looks else 0.0
+        return cost(self._innovations(self.rig)) if self.looks else 0.0
 
     def _finalists(self, hypotheses: Sequence[hypo.ChangeHypothesis], starts: FloatArray) -> list[_Fit]:
         """Return the fits to the clearest look that explain it best, the best first."""
-        look = max(self._looks, key=lambda one: self._on(one).now())
-        clearest = self._on(look)
+        clearest = max((replace(self, looks=[look]) for look in self.looks), key=Fitter.now)
         begun = [(h, clearest._start(h, float(start))) for h, start in zip(hypotheses, starts, strict=True)]
         fits = clearest._fits(sorted(begun, key=lambda one: one[1][2]))
         return sorted(fits, key=lambda fit: fit.cost)[:FINALISTS]
-
-    def _on(self, look: hypo.Look) -> Fitter:
-        """Return the fitter of a single look."""
-        return Fitter(self._rig, self._noise, self._hold, [look], self._scale)
 
     def _fits(self, begun: Iterable[tuple[hypo.ChangeHypothesis, _Point]]) -> list[_Fit]:
         """Return the fits of hypotheses from the points given; a hopeless one ends early."""
@@ -124,20 +120,18 @@ class Fitter:
 
     def _start(self, hypothesis: hypo.ChangeHypothesis, start: float) -> _Point:
         """Return the best of some changes to begin with."""
-        low, high = hypothesis.low - hypothesis.value, hypothesis.high - hypothesis.value
         starts = (start, *(k * hypothesis.least for k in STARTS))
-        tried = [self._at(hypothesis, change) for change in {min(max(s, low), high) for s in starts}]
+        tried = [self._at(hypothesis, change) for change in {hypothesis.within(s) for s in starts}]
         return min(tried, key=lambda one: one[2])
 
     def _fit(self, hypothesis: hypo.ChangeHypothesis, first: _Point, limit: float) -> _Fit:
         """Return the best fit of one hypothesis: Gauss-Newton with the weights of the cost."""
-        low, high = hypothesis.low - hypothesis.value, hypothesis.high - hypothesis.value
         change, w, size = first
         step, sigma = max(0.1 * hypothesis.least, hypothesis.grain), math.inf
         for count in range(ROUNDS):
             if count == TRIES and size > limit:
                 break
-            ahead = change + step if change + step <= high else change - step
+            ahead = change + step if hypothesis.within(change + step) == change + step else change - step
             d = (self._at(hypothesis, ahead)[1] - w) / (ahead - change)
             weight = (FREEDOM + 1.0) / (FREEDOM + w * w)
             information = float(np.nansum(weight * d * d))
@@ -146,7 +140,7 @@ class Fitter:
             sigma, last = 1.0 / math.sqrt(information), change
             move = -float(np.nansum(weight * d * w)) / information
             for share in (1.0, 0.5, 0.2, 0.05):
-                new = self._at(hypothesis, min(max(change + share * move, low), high))
+                new = self._at(hypothesis, hypothesis.within(change + share * move))
                 if new[2] < size:
                     change, w, size = new
                     break
@@ -156,12 +150,12 @@ class Fitter:
 
     def _at(self, hypothesis: hypo.ChangeHypothesis, change: float) -> _Point:
         """Return a change, its innovations and their cost."""
-        w = self._innovations(hypothesis.change(self._rig, change))
+        w = self._innovations(hypothesis.change(self.rig, change))
         return change, w, cost(w)
 
     def _innovations(self, rig: Rig) -> FloatArray:
-        observer = BatchObserver(rig, self._noise, hold=self._hold)
-        by_look = (zip(hypo.whiten(observer, look), self._scale, strict=True) for look in self._looks)
+        observer = BatchObserver(rig, self.noise, hold=self.hold)
+        by_look = (zip(hypo.whiten(observer, look), self.scale, strict=True) for look in self.looks)
         return np.concatenate([w / s for look in by_look for w, s in look])
 
 

@@ -136,6 +136,10 @@ class ChangeHypothesis:
         """Smallest change that is to be alarmed."""
         return self.inner + self.least
 
+    def within(self, change: float) -> float:
+        """Return the nearest change that the bounds allow."""
+        return min(max(change, self.low - self.value), self.high - self.value)
+
     def change(self, rig: Rig, change: float) -> Rig:
         """Return the rig with the parameter changed, within its bounds."""
         value = min(max(self.value + change, self.low), self.high)

@@ -9,7 +9,7 @@ for all parameters together. A deviation beyond the doubt stays a change and ala
 
 import math
 from collections.abc import Callable, Generator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from scipy.optimize import lsq_linear
@@ -81,34 +81,26 @@ USUAL = 1e-3
 """s between measurements with which a look has too few."""
 
 
-@dataclass(frozen=True)
-class Learned:
-    """The tuned rig, its hypotheses, and the first looks with their evidence.
-
-    models: values of the last model by name.
-    """
-
-    rig: Rig
-    hypotheses: tuple[hypo.ChangeHypothesis, ...]
-    models: dict[str, float]
-    looks: Sequence[hypo.Look]
-    evidence: Sequence[hypo.LookEvidence]
-
-
-def learn(rig: Rig, noise: Noise, looks: Sequence[hypo.Look], hold: float) -> Generator[None, None, Learned]:
-    """Tune a rig to looks and return their evidence for it; yield after each examined look."""
+def learn(
+    rig: Rig, noise: Noise, looks: Sequence[hypo.Look], settings: WatchSettings
+) -> Generator[None, None, Changes]:
+    """Tune a rig to looks and return the changes since, these looks taken; yield after each examined look."""
     t = looks[-1].t[looks[-1].kind == STATE]
     period = float(np.median(np.diff(t))) if len(t) > hypo.FEWEST else USUAL
     models = hypo.hypotheses_of(rig, period)
     single = (*(h for h in models if h.name not in (hypo.FACTOR, *hypo.GAINS)), *hypo.nuisances_of(rig))
-    tuned, now = yield from tune(rig, noise, single, looks, hold)
+    tuned, now = yield from tune(rig, noise, single, looks, settings.hold)
     known = {h.name: h for h in now}
     hypotheses = tuple(
         replace(h, value=known[h.name].value, common=known[h.name].common) if h.name in known else h
         for h in models
     )
-    evidence = yield from examine(hypo.Bank(tuned, noise, hypotheses, hold), looks)
-    return Learned(tuned, hypotheses, {h.name: h.value for h in models}, looks, evidence)
+    evidence = yield from examine(hypo.Bank(tuned, noise, hypotheses, settings.hold), looks)
+    last = {h.name: h.value for h in models}
+    changes = Changes(tuned, noise, hypotheses, last, scatter_of(evidence), settings)
+    for look, its in zip(looks, evidence, strict=True):
+        changes.take(look, its)
+    return changes
 
 
 JUMP = 1.0
@@ -142,7 +134,7 @@ class Monitor:
         """Restart the learning of the joint."""
         self._cutter = hypo.Cutter(self._settings.every)
         self._first: list[hypo.Look] = []
-        self._learning = learn(self._rig, self._noise, self._first, self._settings.hold)
+        self._learning = learn(self._rig, self._noise, self._first, self._settings)
         self._examined = -math.inf
         self.changes: Changes | None = None
         self.now = -math.inf
@@ -216,12 +208,6 @@ class Monitor:
             return
         self._examined = self.now
         try:
-            return next(self._learning)
+            next(self._learning)
         except StopIteration as end:
-            learned: Learned = end.value
-        self.changes = Changes(
-            learned.rig, self._noise, learned.hypotheses, learned.models, scatter_of(learned.evidence),
-            self._settings,
-        )  # fmt: skip
-        for look, evidence in zip(learned.looks, learned.evidence, strict=True):
-            self.changes.take(look, evidence)
+            self.changes = end.value

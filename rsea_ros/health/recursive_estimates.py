@@ -25,7 +25,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rsea_ros.health.hypotheses import CHANNELS, ChangeHypothesis, LookEvidence
+from rsea_ros.health.hypotheses import ChangeHypothesis, LookEvidence
 from rsea_ros.records.record import FloatArray
 from rsea_ros.records.statistics import Z95
 
@@ -126,9 +126,7 @@ def _loudness(evidence: LookEvidence) -> FloatArray:
     """Return the logarithm of the mean square by channel; zero for a missing one."""
     present = evidence.counts > 0.0
     mean = np.where(present, evidence.squares, 1.0) / np.where(present, evidence.counts, 1.0)
-    assert len(mean) == len(CHANNELS)
-    loudness: FloatArray = np.log(np.maximum(mean, 1e-12))
-    return loudness
+    return np.asarray(np.log(np.maximum(mean, 1e-12)))
 
 
 HOUR = 3600.0
@@ -139,10 +137,7 @@ SUSPECT = 0.25
 
 
 def threshold(rate: float, sums: int, every: float) -> float:
-    """Return h for a rate of false alarms an hour of a joint.
-
-    sums: number of sums. every: s between looks.
-    """
+    """Return h for a rate of false alarms an hour of a joint. sums: how many. every: s between looks."""
     return math.log(max(sums, 1) * HOUR / (rate * every))
 
 

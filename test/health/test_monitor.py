@@ -8,7 +8,6 @@ from rsea_ros.errors import RigError
 from rsea_ros.health.health_finding import WatchSettings
 from rsea_ros.health.hypotheses import Bank, Cutter
 from rsea_ros.health.monitor import Monitor, learn
-from rsea_ros.health.recursive_estimates import scatter_of
 from rsea_ros.model.observer import noise_of
 from rsea_ros.model.observer.log import events_of
 from rsea_ros.model.rig import EffectSetting
@@ -108,14 +107,14 @@ def test_learning_over_a_while_is_learning_at_one_go():
     """No look counts but the first ones, and the values are those of the bench."""
     t, kind, values = events_of(record_command(BENCH, command(CLEAN, 2), np.random.default_rng(1)))
     first = [look for look in Cutter(1.0).take(t, kind, values) if look.travel() > 0.01][:6]
-    steps = learn(rig(), noise_of(rig()), first, SETTINGS.hold)
+    steps = learn(rig(), noise_of(rig()), first, SETTINGS)
     with pytest.raises(StopIteration) as end:
         while True:
             next(steps)
     at_once, (monitor, _) = end.value.value, watched_from_start(CLEAN, SETTINGS)
     learned = {h.name: (h.value, h.common) for h in monitor.changes._base.hypotheses}
-    assert learned == {h.name: (h.value, h.common) for h in at_once.hypotheses}
-    assert monitor.changes._scatter.scale == pytest.approx(scatter_of(at_once.evidence).scale, rel=1e-12)
+    assert learned == {h.name: (h.value, h.common) for h in at_once._base.hypotheses}
+    assert monitor.changes._scatter.scale == pytest.approx(at_once._scatter.scale, rel=1e-12)
     assert learned["spring.stiffness"][0] == pytest.approx(BENCH.plant.k_s, rel=2e-3)
     assert learned["coulomb_friction.torque"][0] == pytest.approx(BENCH.plant.coulomb, rel=0.02)
 
