@@ -81,8 +81,7 @@ def _bag(path: Path, contents: Contents) -> list[Contents]:
         raise BagError(f"{path}: no bag, expected a directory with .mcap, .db3 or .bag files")
     _tell_unnamed(path, files, contents)
     parts = _scan_all(files, contents)
-    contents.notes.extend(known.remarks.notes)
-    contents.faults.extend(known.remarks.faults)
+    contents.take(known.remarks)
     for topic, expected in known.counts.items():
         read = sum(len(part.topics[topic].raw) for part in parts if topic in part.topics)
         contents.compare(topic, expected, read, metadata.NAME)

@@ -19,6 +19,8 @@ from rsea_ros.records.record import FloatArray, IntArray
 
 ByteMatrix = npt.NDArray[np.uint8]
 
+SECOND = 1_000_000_000
+"""ns."""
 HEADER = 4
 STAMP = 4
 VALUES = "data"
@@ -58,7 +60,7 @@ class Block:
         if not self.layout.stamped:
             return np.zeros(len(self.rows), np.int64)
         seconds = self._cut(STAMP, 4, "i4")[:, 0].astype(np.int64)
-        return seconds * 1_000_000_000 + self.nanoseconds()
+        return seconds * SECOND + self.nanoseconds()
 
     def nanoseconds(self) -> IntArray:
         """Return the part of the header stamps below a second, ns, shape (n,)."""
@@ -122,7 +124,7 @@ class Walk:
     def name(self) -> str:
         """Return a name, which is part of the layout."""
         first, end = self.text()
-        self.structure.append((first, end))
+        self.structure[-1] = (first - 4, end)  # with its length
         return self.raw[first:end].rstrip(b"\x00").decode(errors="replace")
 
     def doubles(self, count: int) -> tuple[int, int]:
@@ -250,7 +252,7 @@ def _written(
     matrix = np.tile(np.frombuffer(raw, np.uint8), (len(stamps), 1))
     fields = layout_of(raw, msgtype).fields
     parts = [(fields[name][0], values.astype("<f8")) for name, values in columns.items()]
-    parts += [(STAMP, np.column_stack([stamps // 1_000_000_000, stamps % 1_000_000_000]).astype("<u4"))]
+    parts += [(STAMP, np.column_stack([stamps // SECOND, stamps % SECOND]).astype("<u4"))]
     for first, values in parts:
         data = np.ascontiguousarray(values).view(np.uint8)
         matrix[:, first : first + data.shape[1]] = data

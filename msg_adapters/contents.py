@@ -3,6 +3,8 @@
 A directory keeps it in metadata.yaml, a single MCAP file in a metadata record named `rsea`.
 """
 
+from __future__ import annotations
+
 import json
 import math
 from collections.abc import Collection, Mapping, Sequence
@@ -60,6 +62,11 @@ class Contents:
         """Add a fault of a topic or a file, once if two sources report it."""
         if not any((f.kind, f.channel, f.size) == (kind, where, size) for f in self.faults):
             self.faults.append(Fault(kind, where, share, detail, size, unit))
+
+    def take(self, remarks: Remarks) -> None:
+        """Add notes and faults that a bag keeps."""
+        self.notes.extend(remarks.notes)
+        self.faults.extend(remarks.faults)
 
     def compare(self, topic: str, expected: int, got: int, witness: str) -> None:
         """Report topics with fewer or more messages than another count says."""

@@ -9,13 +9,12 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from msg_adapters.cdr import Block, Walk, blocks
+from msg_adapters.cdr import SECOND, Block, Walk, blocks
 from msg_adapters.contents import Contents, Messages
 from msg_adapters.topic_map import FLOAT, FLOATS, TopicMap
 from rsea_ros.documents.wording import brief
 from rsea_ros.records.record import BoolArray, FloatArray, IntArray
 
-_SECOND = 1_000_000_000
 _PADDING = 4
 """Bytes behind a message that the middleware may add, less one."""
 
@@ -28,7 +27,7 @@ class Decoded:
 
     def __init__(self, messages: Messages, msgtype: str, fields: tuple[str, ...]) -> None:
         count = len(messages.raw)
-        self._messages, self._msgtype, self.fields = messages, msgtype, fields
+        self._messages, self._msgtype = messages, msgtype
         self.is_unstamped = msgtype in (FLOAT, FLOATS)
         self.stamps: IntArray = np.zeros(count, np.int64)
         self.sound: BoolArray = np.zeros(count, bool)
@@ -45,7 +44,7 @@ class Decoded:
         _mark_overlong(sorted_blocks, damaged)
         for block in sorted_blocks:
             self.stamps[block.rows] = block.stamps()
-            for row in block.rows[block.nanoseconds() >= _SECOND].tolist():
+            for row in block.rows[block.nanoseconds() >= SECOND].tolist():
                 damaged.setdefault(row, "its stamp has more than a second of nanoseconds")
         if damaged:
             first, share = min(damaged), len(damaged) / len(self.stamps)

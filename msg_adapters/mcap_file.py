@@ -12,7 +12,7 @@ from pathlib import Path
 
 from msg_adapters import mcap_records as mcap
 from msg_adapters.compression import ERRORS, Allowance, unpack_chunk
-from msg_adapters.contents import NAME as REMARKS, Contents, Messages, remarks_of
+from msg_adapters.contents import NAME as REMARKS, Contents, remarks_of
 
 UNITS = {
     "damaged_chunks": "chunks",
@@ -22,8 +22,6 @@ UNITS = {
     "unknown_records": "records",
 }
 """Unit of the size of each kind of fault."""
-
-
 CUT_OFF = "cut off (recorder killed?), read up to its last complete message"
 
 
@@ -60,12 +58,8 @@ class _Scanner:
     def __init__(self, contents: Contents, summary: mcap.McapSummary, allowance: Allowance) -> None:
         self.contents, self.summary, self.allowance = contents, summary, allowance
         self.damage: dict[str, tuple[int, str]] = {}
-        self.declared = mcap.Declarations()
-        self.declared.types |= summary.declared.types
-        self.sinks: dict[int, Messages | None] = {}
-        for key, channel in summary.declared.channels.items():
-            self.declared.channels[key] = channel
-            self.sinks[key] = contents.sink(*channel)
+        self.declared = mcap.Declarations(dict(summary.types), dict(summary.channels))
+        self.sinks = {key: contents.sink(*channel) for key, channel in summary.channels.items()}
         self.read: Counter[str] = Counter()
         self.ended = False
 
@@ -103,7 +97,7 @@ class _Scanner:
         """Report topics whose number of messages differs from the statistics of the file."""
         expected: Counter[str] = Counter()
         for key, count in self.summary.counts.items():
-            topic, _ = self.summary.declared.channels.get(key) or self.declared.channels.get(key, ("", ""))
+            topic, _ = self.summary.channels.get(key) or self.declared.channels.get(key, ("", ""))
             expected[topic] += count
         for topic in {**expected, **self.read} if self.summary.counts else ():
             self.contents.compare(topic, expected[topic], self.read[topic], f"the statistics of {file}")
@@ -137,9 +131,7 @@ class _Scanner:
         while at < stop:
             key, at = mcap.text(buffer, at, stop)
             texts[key], at = mcap.text(buffer, at, stop)
-        remarks = remarks_of(texts)
-        self.contents.notes.extend(remarks.notes)
-        self.contents.faults.extend(remarks.faults)
+        self.contents.take(remarks_of(texts))
 
     def _small(self, buffer: mcap.Buffer, opcode: int, first: int, stop: int, base: int) -> None:
         """Process a record of a file or of a chunk, whose records begin at byte `base` of the file.
@@ -173,8 +165,7 @@ class _Scanner:
             self.add("damaged_messages", f"of channel {channel}, which nothing declares")
             return
         self.read[self.declared.channels[channel][0]] += 1
-        sink = self.sinks[channel]
-        if sink is not None:
+        if (sink := self.sinks[channel]) is not None:
             sink.log_times.append(log_time)
             sink.raw.append(buffer[first + mcap.MESSAGE_HEAD.size : stop])
 

@@ -37,12 +37,12 @@ def text(buffer: Buffer, at: int, stop: int) -> tuple[str, int]:
     return buffer[at + 4 : end].decode(errors="replace"), end
 
 
+@dataclass
 class Declarations:
     """Message types and topics by their number in the file."""
 
-    def __init__(self) -> None:
-        self.types: dict[int, str] = {}
-        self.channels: dict[int, tuple[str, str]] = {}
+    types: dict[int, str] = field(default_factory=dict)
+    channels: dict[int, tuple[str, str]] = field(default_factory=dict)
 
     def schema(self, buffer: Buffer, first: int, stop: int) -> None:
         """Read a SCHEMA record."""
@@ -59,13 +59,12 @@ class Declarations:
 
 
 @dataclass
-class McapSummary:
+class McapSummary(Declarations):
     """counts: messages by channel. total: of all channels. chunks: first byte of each, rising.
 
     damage: why it cannot be trusted, empty where it can.
     """
 
-    declared: Declarations = field(default_factory=Declarations)
     counts: dict[int, int] = field(default_factory=dict)
     total: int | None = None
     chunks: list[int] = field(default_factory=list)
@@ -96,9 +95,9 @@ def read_summary(buffer: Buffer) -> McapSummary:
             if at > footer:
                 raise ValueError(f"a record ends at byte {at}, behind the footer at {footer}")
             if opcode == SCHEMA:
-                summary.declared.schema(buffer, first, at)
+                summary.schema(buffer, first, at)
             elif opcode == CHANNEL:
-                summary.declared.channel(buffer, first, at)
+                summary.channel(buffer, first, at)
             elif opcode == CHUNK_INDEX:
                 summary.chunks.append(number(buffer, first + 16, 8, at))
             elif opcode == STATISTICS:

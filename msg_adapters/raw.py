@@ -8,12 +8,11 @@ import math
 import struct
 from collections.abc import Sequence
 
-from msg_adapters.cdr import STAMP, layout_of
+from msg_adapters.cdr import SECOND, STAMP, layout_of
 from msg_adapters.topic_map import WRENCH
 from rsea_ros.documents.wording import brief
 from rsea_ros.errors import ParameterError
 
-SECOND = 1_000_000_000
 LONGEST = 65_536
 """Bytes of a message of one joint or one wrench, with long names. A longer one is refused unread: what a
 cycle does for a message must not depend on who sends it."""
@@ -61,7 +60,7 @@ class RawReader:
                 raise ParameterError(f"{count} numbers of {name}, expected at most one for each joint")
         places = [(*layout.fields[name], place + index) for name, index in self._fields]
         self._at = [first + 8 * at if at < count else 0 for first, count, at in places]  # 0: not in it
-        self._fixed = [(a, b, raw[a:b]) for a, b in _join_runs(layout.structure)]
+        self._fixed = [(a, b, raw[a:b]) for a, b in layout.structure]
         self._stamp, self._double = (struct.Struct(layout.order + kind) for kind in ("iI", "d"))
         self._length, self._stamped = len(raw), layout.stamped
 
@@ -95,13 +94,3 @@ class RawWriter:
         for at, value in zip(self._at, values, strict=False):
             pack(self._bytes, at, value)
         return bytes(self._bytes)
-
-
-def _join_runs(runs: Sequence[tuple[int, int]]) -> list[tuple[int, int]]:
-    """Return first and end of the runs, those that touch as one."""
-    joined: list[tuple[int, int]] = []
-    for first, end in runs:
-        if joined and joined[-1][1] == first:
-            first = joined.pop()[0]
-        joined.append((first, end))
-    return joined

@@ -153,12 +153,9 @@ def _series(
     where = f"{source}: {topic}"
     decoded = Decoded(messages, messages.msgtype, tuple(FIELDS[role].values()))
     decoded_blocks = decoded.blocks(topic, where, report)
-    _one_joint(where, decoded_blocks, topics.joint)
-    element = 0
-    if not any(block.layout.names for block in decoded_blocks):
-        element = _element(where, decoded_blocks, role, topics, report)
+    element = _one_joint(where, decoded_blocks, role, topics, report)
     for block in decoded_blocks:
-        decoded.take(block, {f: _column(block, f, topics, element) for f in decoded.fields})
+        decoded.take(block, {f: _column(block, f, topics, element) for f in decoded.values})
     decoded.tell_empty(topic, report)
     stamps = _with_log_times(topic, where, decoded, messages.log_times, report)
     series = {}
@@ -177,24 +174,21 @@ def _series(
     return series
 
 
-def _one_joint(where: str, decoded_blocks: Sequence[Block], joint: str | None) -> None:
-    layouts = [block.layout for block in decoded_blocks if "wrench" not in block.layout.fields]
-    names = tuple(dict.fromkeys(name for layout in layouts for name in layout.names))
-    count = max([len(names), *(n for layout in layouts for _, n in layout.fields.values())])
-    listed = ", ".join(map(brief, names[:_MOST_NAMED])) or "without names"
-    if joint is not None and names and joint not in names:
-        raise BagError(f"{where}: no joint {joint!r}, the messages hold {listed}")
-    if joint is None and count > 1 and names:
-        raise BagError(f"{where}: {count} joints ({listed}), expected one; name it with --joint")
-
-
-def _element(where: str, blocks: Sequence[Block], role: str, topics: TopicMap, report: Contents) -> int:
+def _one_joint(where: str, blocks: Sequence[Block], role: str, topics: TopicMap, report: Contents) -> int:
     """Return which of several numbers without names counts: that of the map, or the only one ever used.
 
-    Raises BagError where several are, or where there are fewer.
+    0 where they have names. Raises BagError where several count, or none.
     """
     layouts = [block.layout for block in blocks if "wrench" not in block.layout.fields]
+    names, joint = tuple(dict.fromkeys(name for layout in layouts for name in layout.names)), topics.joint
     count = max([n for layout in layouts for _, n in layout.fields.values()], default=1)
+    listed = ", ".join(map(brief, names[:_MOST_NAMED]))
+    if joint is not None and names and joint not in names:
+        raise BagError(f"{where}: no joint {joint!r}, the messages hold {listed}")
+    if joint is None and names and (joints := max(count, len(names))) > 1:
+        raise BagError(f"{where}: {joints} joints ({listed}), expected one; name it with --joint")
+    if names:
+        return 0
     chosen = topics.element(role)
     if chosen is None and count > 1:
         parts = [block.field(name) for block in blocks for name in block.layout.fields]

@@ -18,6 +18,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
 
+from msg_adapters.cdr import SECOND
 from rsea_ros.errors import ParameterError
 
 __all__ = [
@@ -26,7 +27,6 @@ __all__ = [
 ]  # fmt: skip
 
 OK, WARN, ERROR, STALE = (b"\x00", b"\x01", b"\x02", b"\x03")
-SECOND = 1_000_000_000
 
 
 def time_of(stamp_ns: int) -> Time:

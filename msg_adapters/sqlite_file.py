@@ -134,9 +134,7 @@ def _remarks(database: sqlite3.Connection, path: Path, contents: Contents) -> No
     except sqlite3.Error:
         return
     for (data,) in rows:
-        remarks = metadata.remarks_in(path, data if isinstance(data, bytes) else b"")
-        contents.notes.extend(remarks.notes)
-        contents.faults.extend(remarks.faults)
+        contents.take(metadata.remarks_in(path, data if isinstance(data, bytes) else b""))
 
 
 def _text(data: bytes | str) -> str:

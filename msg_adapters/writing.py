@@ -110,8 +110,12 @@ class BagWriter:
         self.keep_up()
 
     def _known(self, topic: str, msgtype: str) -> tuple[int, Topic]:
-        """Return key and topic. Raises BagError for a topic of another type than before."""
-        key, known = self._topics.get(topic) or self._declare(topic, msgtype)
+        """Return key and topic, declared. Raises BagError for a topic of another type than before."""
+        if topic not in self._topics:
+            check_topic(topic)
+            known = Topic(topic, msgtype, definition(msgtype).digest)
+            self._topics[topic] = (self._storage.add(topic, msgtype), known)
+        key, known = self._topics[topic]
         if known.msgtype != msgtype:
             raise BagError(f"topic {topic}: is {known.msgtype} and {msgtype}, expected one type")
         return key, known
@@ -120,12 +124,6 @@ class BagWriter:
         topic.count += messages
         span = self._span if self._span[1] else (first, last)
         self._span = (min(span[0], first), max(span[1], last))
-
-    def _declare(self, topic: str, msgtype: str) -> tuple[int, Topic]:
-        check_topic(topic)
-        known = Topic(topic, msgtype, definition(msgtype).digest)
-        self._topics[topic] = (self._storage.add(topic, msgtype), known)
-        return self._topics[topic]
 
     def keep_up(self) -> None:
         """Flush once in an interval, and let a thread wait for the disk; call it also while nothing comes."""
