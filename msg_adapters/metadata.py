@@ -121,29 +121,27 @@ def _metadata_from(bag: Path, document: Any) -> Known:
 
 
 def _why(error: Exception) -> str:
-    match error:
-        case NotUnderstood():
-            return brief(str(error))
-        case KeyError():
-            return f"no {brief(str(error.args[0]))}"
-    return "not in the form that rosbag2 writes"
+    if isinstance(error, KeyError):
+        return f"no {brief(str(error.args[0]))}"
+    return brief(str(error)) if isinstance(error, NotUnderstood) else "not in the form that rosbag2 writes"
 
 
 def _text_of(value: Any) -> str:
-    if not isinstance(value, str) or "\0" in value:
-        raise NotUnderstood(f"{brief(repr(value))}, expected a text")
-    return value
+    return str(_expect(value, isinstance(value, str) and "\0" not in value, "a text"))
 
 
 def _count_of(value: Any) -> int:
-    if not (isinstance(value, str) and value.isdecimal() and value.isascii() and len(value) < 19):
-        raise NotUnderstood(f"message_count {brief(repr(value))}, expected a number")
-    return int(value)
+    is_count = isinstance(value, str) and value.isdecimal() and value.isascii() and len(value) < 19
+    return int(_expect(value, is_count, "a number", "message_count "))
 
 
-def _list_of(value: Any) -> list[Any]:
-    if not isinstance(value, list):
-        raise NotUnderstood(f"{brief(repr(value))}, expected a list")
+def _list_of(value: Any) -> Any:
+    return _expect(value, isinstance(value, list), "a list")
+
+
+def _expect(value: Any, is_so: bool, expected: str, name: str = "") -> Any:
+    if not is_so:
+        raise NotUnderstood(f"{name}{brief(repr(value))}, expected {expected}")
     return value
 
 

@@ -69,7 +69,13 @@ def _root(base: str, names: Any) -> str:
 
 def _array(file: IO[bytes], name: str, size: int) -> Any:
     """Read an array whose header agrees with the file. size: its bytes in the file."""
-    shape, dtype = _header(file, name)
+    try:
+        version = npy.read_magic(file)
+        shape, _, dtype = _HEADERS[version](file)
+    except KeyError:
+        raise ValueError(f"array {name!r} is of version {version}, expected (1, 0) or (2, 0)") from None
+    except Exception:  # NumPy evaluates it as a literal: a damaged one may bring errors of any kind
+        raise ValueError(f"array {name!r} has no header that can be read; a damaged file?") from None
     held = float(np.prod(shape, dtype=float)) * dtype.itemsize
     if dtype.hasobject:
         raise ValueError(f"array {name!r} holds Python objects, expected numbers")
@@ -79,17 +85,6 @@ def _array(file: IO[bytes], name: str, size: int) -> Any:
         raise ValueError(f"array {name!r} is {dtype} {shape}, more than its {size} bytes; a damaged file?")
     file.seek(0)
     return npy.read_array(file, allow_pickle=False)
-
-
-def _header(file: IO[bytes], name: str) -> tuple[Any, Any]:
-    try:
-        version = npy.read_magic(file)
-        shape, _, dtype = _HEADERS[version](file)
-    except KeyError:
-        raise ValueError(f"array {name!r} is of version {version}, expected (1, 0) or (2, 0)") from None
-    except Exception:  # NumPy evaluates it as a literal: a damaged one may bring errors of any kind
-        raise ValueError(f"array {name!r} has no header that can be read; a damaged file?") from None
-    return shape, dtype
 
 
 def _numbers(column: str, place: ElementAddress, arrays: Any, names: Any) -> FloatArray:
@@ -123,33 +118,27 @@ def _vector(column: str, values: Any) -> FloatArray:
 HDF5 = b"\x89HDF\r\n\x1a\n"
 _MAT_HEADER = 128
 """Bytes before the first variable."""
+_ORDERS: Mapping[bytes, Literal["little", "big"]] = {b"IM": "little", b"MI": "big"}
 
 
 def read_mat(path: Path, wanted: Wanted) -> Table:
     """Return the requested variables. Raises OSError and ValueError with variable, shape and expectation."""
-    with path.open("rb") as file:
-        head = file.read(520)
-    if head.startswith(b"MATLAB 7.3") or HDF5 in (head[:8], head[512:]):
-        raise ValueError(
-            "MAT file of version 7.3 (HDF5), expected version 7: save(…, '-v7') in MATLAB, or docs/import.md"
-        )
-    _refuse_cut_off(path)
-    return read_apart("MAT", LARGEST, path, wanted.columns)
-
-
-def _refuse_cut_off(path: Path) -> None:
-    """Raise ValueError for a file of version 5 to 7 whose last variable goes on beyond its end."""
     size = path.stat().st_size
     with path.open("rb") as file:
-        head = file.read(_MAT_HEADER)
-        if not head.startswith(b"MATLAB 5.0") or head[126:128] not in (b"IM", b"MI"):
-            return
-        order: Literal["little", "big"] = "little" if head[126:128] == b"IM" else "big"
-        while tag := file.read(8):
+        head = file.read(520)
+        if head.startswith(b"MATLAB 7.3") or HDF5 in (head[:8], head[512:]):
+            raise ValueError(
+                "MAT file of version 7.3 (HDF5), expected version 7: save(…, '-v7') in MATLAB,"
+                " or docs/import.md"
+            )
+        file.seek(_MAT_HEADER)
+        order = _ORDERS.get(head[126:128]) if head.startswith(b"MATLAB 5.0") else None
+        while order and (tag := file.read(8)):
             end = file.tell() + int.from_bytes(tag[4:8], order)
             if len(tag) < 8 or end > size:
                 raise ValueError(f"MAT file cut off at {size} bytes, expected {end} or more: copy it again")
             file.seek(end)
+    return read_apart("MAT", LARGEST, path, wanted.columns)
 
 
 def read_parquet(path: Path, wanted: Wanted) -> Table:

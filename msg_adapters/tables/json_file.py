@@ -8,6 +8,7 @@ values hold for all its samples; the way to the list of trials (`.`: the documen
 import json
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,6 @@ from msg_adapters.tables.child import ElementAddress, finite_table, place_of
 from msg_adapters.tables.column_table import Table, Wanted, check_size, checked_lengths, index_of
 from msg_adapters.tables.layout import seconds_of
 from rsea_ros.documents.wording import brief, no_utf_8, quote
-from rsea_ros.records.record import FloatArray
 
 LARGEST_FILE = 200_000_000
 """Bytes: read as a whole, they take about eight times as much memory."""
@@ -44,7 +44,13 @@ def read_json(path: Path, wanted: Wanted) -> Table:
     texts = [column for column in wanted.labels if any(isinstance(cell, str) for cell in cells[column])]
     labels = {c: np.array(["" if v is None else str(v) for v in cells[c]]) for c in texts}
     dated = frozenset(c for c in wanted.stamps if isinstance(cells[c][0], str))
-    vectors = {c: _vector(c, places[c], cells[c], c in dated) for c in cells if c not in labels}
+    for c in dated - labels.keys():
+        cells[c] = [seconds_of(cell) if isinstance(cell, str) else cell for cell in cells[c]]
+    vectors = {
+        c: np.array([_number(cell, places[c], c, at) for at, cell in enumerate(cells[c])], np.float64)
+        for c in cells
+        if c not in labels
+    }
     check_size(len(next(iter(cells.values()))), len(cells))
     checked_lengths({column: len(c) for column, c in cells.items()})
     numbers = np.repeat(np.arange(1.0, len(lengths) + 1), lengths)
@@ -125,12 +131,6 @@ def _list_of(value: Any, way: str) -> str:
     return before.removeprefix(".") or "."
 
 
-def _vector(column: str, place: ElementAddress, cells: list[Any], is_dated: bool) -> FloatArray:
-    if is_dated:
-        cells = [seconds_of(cell) if isinstance(cell, str) else cell for cell in cells]
-    return np.array([_number(cell, place, column, at) for at, cell in enumerate(cells)], np.float64)
-
-
 def _cells(value: Any, way: str) -> Any:
     """Return the values at the end of a path. Raises KeyError where it leads nowhere."""
     if not way:
@@ -143,18 +143,13 @@ def _cells(value: Any, way: str) -> Any:
                 return _cells(value[way[:at]], way[at + 1 :])
         raise KeyError(way)
     if isinstance(value, list) and value and all(isinstance(item, dict) for item in value):
-        cells = [_cell(item, way) for item in value]
-        if all(cell is None for cell in cells):
-            raise KeyError(way)
-        return cells
+        cells: list[Any] = [None] * len(value)
+        for at, item in enumerate(value):
+            with suppress(KeyError):
+                cells[at] = _cells(item, way)
+        if any(cell is not None for cell in cells):
+            return cells
     raise KeyError(way)
-
-
-def _cell(record: Any, way: str) -> Any:
-    try:
-        return _cells(record, way)
-    except KeyError:
-        return None
 
 
 def _names(value: Any, before: str = "", depth: int = 0) -> Iterable[str]:
@@ -178,9 +173,7 @@ def _element(cell: Any, place: ElementAddress, column: str, at: int) -> Any:
 
 def _number(cell: Any, place: ElementAddress, column: str, at: int) -> float:
     """Return a number, NaN for null. Raises ValueError for anything else."""
-    if cell is None:
-        return math.nan
-    if place.index is not None and not place.is_row:
+    if cell is not None and place.index is not None and not place.is_row:
         cell = _element(cell, place, column, at)
     if cell is None:
         return math.nan

@@ -69,14 +69,12 @@ def _readings(name: str, x: FloatArray, gain: float | None) -> Iterator[_Reading
     low, high = float(x.min()), float(x.max())
     for bits in _WORDS if low >= 0.0 else ():
         if 2 ** (bits - 1) <= high < 2**bits:
-            what, read = f"signed {bits} bit numbers read as unsigned", f"int{bits}"
-            y = np.asarray(PLAIN[read][0](x), np.float64)
-            yield _Reading(what, f'`expression: "{read}({name})"`', y, 2.0**bits, 2.0**bits)
+            what, y = f"signed {bits} bit numbers read as unsigned", PLAIN[f"int{bits}"][0](x)
+            yield _Reading(what, f'`expression: "int{bits}({name})"`', y, 2.0**bits, 2.0**bits)
     for bit in _SIGN_BITS if low >= 0.0 else ():
         if 2**bit < high < 2 ** (bit + 1):
-            what, read = f"numbers whose bit {bit} is their sign", "sign_magnitude"
-            y = np.asarray(PLAIN[read][0](x, bit), np.float64)
-            yield _Reading(what, f'`expression: "{read}({name}, {bit})"`', y, 2.0**bit, 2.0 ** (bit + 1))
+            what, y = f"numbers whose bit {bit} is their sign", PLAIN["sign_magnitude"][0](x, bit)
+            yield _Reading(what, f'`expression: "sign_magnitude({name}, {bit})"`', y, 2.0**bit, 2.0**bit * 2)
     circle = 2.0 ** math.ceil(math.log2(max(high + 1.0, -2.0 * low, 2.0 * high + 2.0 if low < 0.0 else 0.0)))
     if gain is not None and 2**8 <= circle <= 2**32:
         gear = abs(gain) * circle / (2.0 * math.pi)

@@ -30,7 +30,7 @@ from rsea_ros.experiment.hypothesis import NOTHING, Hypothesis, may_contain, sha
 from rsea_ros.identification.fit import unknowns_of
 from rsea_ros.identification.problem import Case, Problem, case_from
 from rsea_ros.identification.solver import Map, Solution, power, serial, solve
-from rsea_ros.identification.unknowns import Unknown, idle, unknowns_of_effect
+from rsea_ros.identification.unknowns import Unknown, idle, start_vector, unknowns_of_effect
 from rsea_ros.model.rig import EffectSetting, Rig
 from rsea_ros.records.record import MEASURED, BoolArray, FloatArray, Record
 
@@ -76,14 +76,13 @@ def _width(unknown: Unknown, parameter: Parameter) -> float:
 
 def vector_at(problem: Problem, near: Mapping[str, float], start: Mapping[str, float]) -> FloatArray:
     """Return coordinates of a problem: `start` where it says, else `near` (coordinates), else its prior."""
-    return np.array(
-        [
-            u.inner(min(max(start[u.name], u.low), u.high))
-            if u.name in start
-            else near.get(u.name, u.inner(u.start))
-            for u in problem.unknowns
-        ]
-    )
+
+    def coordinate(u: Unknown) -> float:
+        if u.name in start:
+            return u.inner(min(max(start[u.name], u.low), u.high))
+        return near.get(u.name, u.inner(u.start))
+
+    return np.array([coordinate(u) for u in problem.unknowns])
 
 
 def weights_of(problem: Problem) -> FloatArray:
@@ -105,8 +104,8 @@ def fit_cause(
     name: str, problem: Problem, before: FloatArray | None, near: Mapping[str, float], run: Map
 ) -> Solution:
     """Return a cause fitted from the best of its guesses, and from where it was or the rig's own fit."""
-    guesses = effect_named(name).default_guesses if name != NOTHING else [{}]
-    named = [{f"{name}.{k}": v for k, v in guess.items()} for guess in [*guesses, *_smaller(name, guesses)]]
+    guesses = [{}] if name == NOTHING else [*effect_named(name).default_guesses, *_smaller(name)]
+    named = [{f"{name}.{k}": v for k, v in guess.items()} for guess in guesses]
     rows = [vector_at(problem, {}, guess) for guess in named]
     others = [before] if before is not None else [vector_at(problem, near, g) for g in named if near]
     starts = [_best(problem, group, run) for group in (rows, others) if group]
@@ -114,11 +113,9 @@ def fit_cause(
     return min(fits, key=lambda s: s.cost)
 
 
-def _smaller(name: str, guesses: Sequence[Guess]) -> list[Guess]:
+def _smaller(name: str) -> list[Guess]:
     """Return guesses of a cause with a share of its typical size: a minimum may lie nearer to none at all."""
-    if name == NOTHING:
-        return []
-    main = effect_named(name).main
+    main, guesses = effect_named(name).main, effect_named(name).default_guesses
     if not math.isfinite(main.null) or (main.logarithmic and main.null <= 0.0):
         return []
     return [{**g, main.name: main.null + _SHARE * (g[main.name] - main.null)} for g in guesses]
@@ -172,10 +169,9 @@ def _as_simpler(name: str, problem: Problem, simpler: str, fit: Solution) -> lis
     """Return the start at which a cause does only what the fit of a simpler one does; none if it cannot."""
     if not may_contain(name, simpler):
         return []
-    values = {u.name: u.outer(float(v)) for u, v in zip(fit.problem.unknowns, fit.theta, strict=True)}
     absent = {f"{name}.{p.name}": p.null for p in effect_named(name).parameters if math.isfinite(p.null)}
-    same = {f"{name}.{p}": values[f"{simpler}.{s}"] for p, s in shared_parameters(name, simpler).items()}
-    return [vector_at(problem, {}, values | absent | same)]
+    same = {f"{name}.{p}": fit.values[f"{simpler}.{s}"] for p, s in shared_parameters(name, simpler).items()}
+    return [vector_at(problem, {}, fit.values | absent | same)]
 
 
 def _best(problem: Problem, thetas: Sequence[FloatArray], run: Map) -> FloatArray:
@@ -187,7 +183,7 @@ def _best(problem: Problem, thetas: Sequence[FloatArray], run: Map) -> FloatArra
 
 
 def _cost(problem: Problem, theta: FloatArray) -> float:
-    away = theta - np.array([u.inner(u.start) for u in problem.unknowns])
+    away = theta - start_vector(problem.unknowns)
     return power(problem.residual(theta)) + float(weights_of(problem) @ away**2)
 
 
@@ -240,18 +236,14 @@ class RunWeighing:
 
 
 def cases_of(records: Sequence[Record], rig: Rig) -> tuple[Case, ...]:
-    """Return records ready to be fitted, their faulty samples masked."""
-    checked = [check(record, rig) for record in records]
-    return tuple(_once(case_from(c.record, rig, c.masked)) for c in checked)
-
-
-def _once(case: Case) -> Case:
-    """Return a case in which a value that repeats counts once, in the middle of its run.
+    """Return records ready to be fitted, faulty samples masked; a value that repeats counts once.
 
     In slow motion an encoder rounds many samples in a row to one count, by the same error: they are one
     observation, and taken as many they would turn the rounding of a turning point into physics.
     """
-    return case.within({n: middles_of_runs(y) for n, y in case.measured.items()})
+    checked = [check(record, rig) for record in records]
+    cases = [case_from(c.record, rig, c.masked) for c in checked]
+    return tuple(c.within({n: middles_of_runs(y) for n, y in c.measured.items()}) for c in cases)
 
 
 def middles_of_runs(y: FloatArray) -> BoolArray:

@@ -36,7 +36,8 @@ def refine(
         "steps": ("bias", "amplitude", "hold"),
         "holds": ("bias", "amplitude", "hold"),
     }[start.kind]
-    first = np.array([_inner(n, getattr(start, n)) for n in names])
+    values = {n: getattr(start, n) for n in names}
+    first = np.array([math.log(v) if n in _LOGARITHMIC else v for n, v in values.items()])
     seen: list[tuple[float, Shape]] = []
 
     def loss(x: FloatArray) -> float:
@@ -55,10 +56,6 @@ def refine(
 
 
 _LOGARITHMIC = ("low", "high", "hold")
-
-
-def _inner(name: str, value: float) -> float:
-    return math.log(value) if name in _LOGARITHMIC else value
 
 
 def _outer(name: str, x: float, asked: DesignRequest) -> float:
@@ -180,19 +177,17 @@ def _final(
     linear = separation.separations(hypotheses, responses)
     table = _with_refits(rater, command, linear)
     names = tuple(h.name for h in hypotheses)
-    k = len(names)
-    pairs = tuple((names[i], names[j]) for i in range(k) for j in range(i + 1, k) if apart[i, j])
+    pairs = tuple((names[i], names[j]) for i, j in combinations(range(len(names)), 2) if apart[i, j])
     narrow = separation.information_gain(hypotheses[0], responses[0])
     energy = float(np.sum(command**2) / asked.rate)
     nearer = np.divide(table, linear, out=np.ones_like(table), where=np.isfinite(table) & (linear > 0.0))
     rows = separation.likely_separations(hypotheses, responses)
     nearest = [r * n for r, n in zip(rows, nearer, strict=True)]
     chances = separation.chances_decided(hypotheses, nearest, apart)
-    share = separation.share_decided(rater, chances) if k > 1 else 1.0
+    share = separation.share_decided(rater, chances) if len(names) > 1 else 1.0
     return Proposal(
         shape, length, asked.rate, command, names, table, pairs, share, tuple(chances.tolist()),
-        _resolved(rater, chances, rows, apart), narrow,
-        reached, tried, energy,
+        _resolved(rater, chances, rows, apart), narrow, reached, tried, energy,
     )  # fmt: skip
 
 
@@ -204,8 +199,7 @@ def limit_command(
     By bisection, because the worst response is not linear in the command. Raises
     ParameterError where even the share _SMALLEST of it breaks the limits.
     """
-    low, high, best = math.log(_SMALLEST), 0.0, None
-    scale = high
+    low, high, scale, best = math.log(_SMALLEST), 0.0, 0.0, None
     for _ in range(_BISECTIONS):
         reached = peaks(math.exp(scale) * command, asked.rate, groups)
         if largest_share(reached.at_level, asked.limits) <= 1.0:
@@ -216,12 +210,11 @@ def limit_command(
             break
         scale = 0.5 * (low + high)
     if best is None:
+        limits = asked.limits.finite_limits().items()
+        still = ", ".join(f"{n} {reached.at_level[n]:.4g} of {v:g}" for n, v in limits)
         raise ParameterError(
             "no run keeps the limits for all that the bench may be, expected wider limits: at a share of "
-            f"{_SMALLEST:g} still "
-            + ", ".join(
-                f"{n} {reached.at_level[n]:.4g} of {v:g}" for n, v in asked.limits.finite_limits().items()
-            )
+            f"{_SMALLEST:g} still {still}"
         )
     return best
 

@@ -5,7 +5,7 @@ Codes are permanent, because fault managers rely on them. A discarded code is ne
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -38,26 +38,19 @@ class _Sensor:
     """s, since when; nan while it moves."""
 
 
-@dataclass
 class Sensors:
     """The present faults of a rig's sensors. bad_values: samples that were not numbers."""
 
-    rig: Rig
-    bad_values: int = 0
-    _state: dict[str, _Sensor] = field(default_factory=dict)
-    _spans: dict[str, list[tuple[float, float, float]]] = field(default_factory=dict)
-    _begin: float = math.inf
-    _now: float = -math.inf
-    _silence: float = 0.0
-
-    def __post_init__(self) -> None:
-        self._noise = {n: max(s.noise, s.quantum, 1e-12) for n, s in self.rig.sensors.items()}
+    def __init__(self, rig: Rig) -> None:
+        self.rig, self.bad_values = rig, 0
+        self._noise = {n: max(s.noise, s.quantum, 1e-12) for n, s in rig.sensors.items()}
         self._noise["command"] = self._noise.get("motor_torque", self._noise.get("ft", 1e-3))
         self.begin()
 
     def begin(self) -> None:
         """Forget all measurements."""
-        self._begin, self._now, self._spans, self._silence = math.inf, -math.inf, {}, 0.0
+        self._begin, self._now, self._silence = math.inf, -math.inf, 0.0
+        self._spans: dict[str, list[tuple[float, float, float]]] = {}
         self._state = {name: _Sensor() for name in CHANNELS if name in self.rig.sensors}
 
     def take(self, t: FloatArray, kind: IntArray, values: FloatArray) -> None:

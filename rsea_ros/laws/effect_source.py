@@ -30,7 +30,7 @@ _ADDS = {
 }  # fmt: skip
 
 
-def body_of(law: laws.Law) -> str:
+def body_of(law: laws.Law) -> list[str]:
     lines, state, at = _variables(law), int(law.is_friction), 0
     sizes: list[str] = []
     smooth: list[str] = []
@@ -48,13 +48,10 @@ def body_of(law: laws.Law) -> str:
     if sizes:
         lines.append(f"x[0] = mean_friction(s, {' + '.join(sizes)}, x[0], p[{index['creep_velocity']}])")
     total = " + ".join([*smooth, *(["-x[0]"] if sizes else [])])
-    lines += [f"torque = {total}", *_addition_lines(law, state)]
-    return "\n".join(f"    {line}" for line in lines)
+    return [*lines, f"torque = {total}", *_addition_lines(law, state)]
 
 
-def curve_body(law: laws.Law) -> str:
-    curve = law.curve
-    assert curve is not None
+def curve_body(law: laws.Law, curve: laws.LearntCurve) -> list[str]:
     lines = [*_variables(law), f"at = ({curve.over} - FIRST) / SPACING",
              f"at = min(max(at, 0.0), {len(curve.x) - 1}.0)", f"k = min(int(at), {len(curve.x) - 2})",
              "value = CURVE[k] + (at - k) * (CURVE[k + 1] - CURVE[k])"]  # fmt: skip
@@ -62,9 +59,7 @@ def curve_body(law: laws.Law) -> str:
               "w": " * w" if curve.over == "t" else " * tanh(w / 2e-3)"}[curve.factor]  # fmt: skip
     if law.place == "ft" and curve.factor == "T":
         factor = " * T"
-    return "\n".join(
-        f"    {line}" for line in [*lines, f"torque = p[0] * value{factor}", *_addition_lines(law, 0)]
-    )
+    return [*lines, f"torque = p[0] * value{factor}", *_addition_lines(law, 0)]
 
 
 def _read(law: laws.Law, letter: str) -> str:
@@ -155,7 +150,8 @@ class LawProvenance:
 def source_of(law: laws.Law, claims: Claims, provenance: LawProvenance) -> str:
     """Return the text of the effect file."""
     header = _docstring(law, provenance)
-    body = curve_body(law) if law.curve is not None else body_of(law)
+    lines = curve_body(law, law.curve) if law.curve is not None else body_of(law)
+    body = "\n".join(f"    {line}" for line in lines)
     signature = 'def apply(s, p, x):  # type: ignore[no-untyped-def]\n    """Add the law."""'
     function = f"@compiled\n{signature}\n{body}\n"
     return f"{header}\n{_imports(law, body)}\n{_tables(law)}\n{function}\n\n{_effect(law, claims)}"
