@@ -81,11 +81,7 @@ def _one_frame(decompressor: Any, packed: bytes, most: int) -> bytes:
     plain: bytes = decompressor.decompress(packed, max_length=most + 1)
     if len(plain) > most:
         raise ValueError(f"unpacks to more than {most} bytes, which is all that it may")
-    if not decompressor.eof and not (len(plain) == most and _ends(decompressor)):
+    has_more = not decompressor.eof and len(plain) == most and decompressor.decompress(b"", max_length=1)
+    if has_more or not decompressor.eof:
         raise ValueError(f"its compressed data break off after {len(plain)} bytes")
     return plain
-
-
-def _ends(decompressor: Any) -> bool:
-    """Return whether a frame that has given all its bytes has its end too."""
-    return not decompressor.decompress(b"", max_length=1) and bool(decompressor.eof)

@@ -114,18 +114,15 @@ def remarks_of(texts: object) -> Remarks:
 
 
 def _faults(text: str) -> list[Fault]:
+    """Return the faults of rows [kind, channel, share, detail]; of anything else none."""
     try:
         rows = json.loads(text) if text else []
     except (ValueError, RecursionError):
         return []
-    faults = [_fault(row) for row in rows[:_MOST]] if isinstance(rows, list) else []
-    return [fault for fault in faults if fault is not None]
-
-
-def _fault(row: object) -> Fault | None:
-    """Return the fault of a row [kind, channel, share, detail], None for anything else."""
-    match row:
-        case [str(kind), str(channel), float() | int() as share, str(detail)] if kind in KEPT:
-            whole = share if 0.0 <= share <= 1.0 else math.nan
-            return Fault(kind, brief(channel, _LONGEST), float(whole), brief(detail, _LONGEST))
-    return None
+    faults = []
+    for row in rows[:_MOST] if isinstance(rows, list) else ():
+        match row:
+            case [str(kind), str(channel), float() | int() as share, str(detail)] if kind in KEPT:
+                whole = float(share if 0.0 <= share <= 1.0 else math.nan)
+                faults.append(Fault(kind, brief(channel, _LONGEST), whole, brief(detail, _LONGEST)))
+    return faults

@@ -141,22 +141,18 @@ def _check(node: ast.AST, text: str, *, is_quoted: bool) -> None:
         part = brief(ast.get_source_segment(text.strip(), node) or text)
         raise ValueError(f"has {part!r}, expected columns, numbers, + - * / ** and functions")
     if isinstance(node, ast.Call) and _column_name(node) is None:
-        _check_call(node)
+        name = node.func.id if isinstance(node.func, ast.Name) else "a call of a result"
+        if name not in FUNCTIONS:
+            near = difflib.get_close_matches(name, FUNCTIONS, n=1)
+            hint = f", did you mean {near[0]}?" if near else ""
+            raise ValueError(f"calls {brief(name)}, expected {COLUMN}, {', '.join(FUNCTIONS)}{hint}")
+        given, count = len(node.args) + len(node.keywords), FUNCTIONS[name][1]
+        if given != count or node.keywords:
+            raise ValueError(f"calls {name} with {given} values, expected {count}")
     if isinstance(node, ast.Constant) and not is_quoted:
         value = node.value
         if not isinstance(value, (int, float)) or isinstance(value, bool) or not abs(value) < 1e300:
             raise ValueError(f"has {quote(value)}, expected a plain number")
-
-
-def _check_call(node: ast.Call) -> None:
-    name = node.func.id if isinstance(node.func, ast.Name) else "a call of a result"
-    if name not in FUNCTIONS:
-        near = difflib.get_close_matches(name, FUNCTIONS, n=1)
-        hint = f", did you mean {near[0]}?" if near else ""
-        raise ValueError(f"calls {brief(name)}, expected {COLUMN}, {', '.join(FUNCTIONS)}{hint}")
-    count = FUNCTIONS[name][1]
-    if len(node.args) != count or node.keywords:
-        raise ValueError(f"calls {name} with {len(node.args) + len(node.keywords)} values, expected {count}")
 
 
 def _value(node: ast.AST, columns: Mapping[str, FloatArray], t: FloatArray) -> Any:

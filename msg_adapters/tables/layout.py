@@ -27,11 +27,6 @@ def numeral(cell: str, decimal: str = ".") -> str:
     return _FORTRAN.sub(r"\1e\2", cell) if _FORTRAN.fullmatch(cell) else cell
 
 
-def is_numeral(cell: str) -> bool:
-    """Return whether a cell is a number, with a decimal comma or a D exponent too."""
-    return is_decimal(numeral(cell, ","))
-
-
 def seconds_of(cell: str) -> float | None:
     """Return an ISO 8601 date-time as s since 1970, None for anything else; without a zone it is UTC.
 
@@ -93,9 +88,11 @@ def split(line: str, delimiter: str) -> list[str]:
 
 def index_in(column: str, names: Sequence[str]) -> int:
     """Return where a column stands, by its name or its number, from 1. Raises ValueError for neither."""
-    if column not in names and column.isdecimal() and 1 <= int(column[:6]) <= len(names):
-        return int(column) - 1
-    return index_of(column, names)
+    return int(column) - 1 if _is_number(column, names) else index_of(column, names)
+
+
+def _is_number(column: str, names: Sequence[str]) -> bool:
+    return column not in names and column.isdecimal() and 1 <= int(column[:6]) <= len(names)
 
 
 def layout_of(
@@ -135,7 +132,7 @@ def _names(layout: TextLayout, column: str) -> bool:
 
 def _has(layout: TextLayout, column: str) -> bool:
     base, _ = base_and_index(column, layout.names)
-    return base in layout.names or (base.isdecimal() and 1 <= int(base[:6]) <= len(layout.names))
+    return base in layout.names or _is_number(base, layout.names)
 
 
 def _layout(lines: Sequence[str], delimiter: str, wanted: Wanted) -> TextLayout:
@@ -146,7 +143,7 @@ def _layout(lines: Sequence[str], delimiter: str, wanted: Wanted) -> TextLayout:
         width = max((_width(split(line, delimiter)) for line in lines[1:]), default=0)
         cells = cells[: max(width, _width(cells), 1)]
         cells += [""] * (width - len(cells)) if is_numbered else []
-    is_data = all(is_numeral(cell) or _DATE_TIME.fullmatch(cell) for cell in cells if cell)
+    is_data = all(is_decimal(numeral(cell, ",")) or _DATE_TIME.fullmatch(cell) for cell in cells if cell)
     if is_data if header is None else not header:
         return TextLayout(delimiter, tuple(str(number + 1) for number in range(len(cells))), headed=False)
     return TextLayout(delimiter, tuple(cells), headed=True)

@@ -19,7 +19,7 @@ from rsea_ros.experiment.hypothesis import NOTHING, Hypothesis, run_case
 from rsea_ros.experiment.proposal import DesignRequest, Proposal
 from rsea_ros.experiment.run_design import propose
 from rsea_ros.experiment.run_shape import RunLimits
-from rsea_ros.experiment.separation import noise_by_channel, share_of_limits
+from rsea_ros.experiment.separation import noise_by_channel
 from rsea_ros.identification.excitation import ramp_ends
 from rsea_ros.identification.problem import Problem
 from rsea_ros.identification.solver import Map, serial, solve
@@ -88,7 +88,7 @@ def _sine(
         bias + amplitude * np.sin(2.0 * np.pi * frequency * t), round(0.2 * rate)
     )
     for _ in range(3):
-        share = share_of_limits(true, command, rate, limits)
+        share = true.share_of(limits, command, rate)
         if share <= 1.0:
             break
         command = command * (0.98 / share if np.isfinite(share) else 0.3)

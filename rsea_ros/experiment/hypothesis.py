@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rsea_ros.effects.catalogue import effect_named
+from rsea_ros.experiment.run_shape import RunLimits, largest_share, of_command, of_response
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Map, jacobian, serial
 from rsea_ros.identification.unknowns import apply, bounds_of
@@ -114,6 +115,11 @@ class Hypothesis:
             return self.theta
         away, sd = self._size()
         return np.asarray(self._with_size(np.array([np.copysign(max(sd - abs(away), 0.0), away)]))[0])
+
+    def share_of(self, limits: RunLimits, command: FloatArray, rate: float) -> float:
+        """Return the share of the limits that a command uses at the values to be expected. rate: Hz."""
+        outputs = motion(self.rig_at(self.if_there()), command, rate)
+        return largest_share(of_response(command, outputs) | of_command(command, rate), limits)
 
     def likely_values(self) -> FloatArray:
         """Return values that the cause may have if it is present, shape (m, n): equally likely sizes of it.

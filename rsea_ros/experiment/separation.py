@@ -14,17 +14,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import ndtr
 
-from rsea_ros.experiment.hypothesis import Hypothesis, Response, motion, response, run_case
+from rsea_ros.experiment.hypothesis import Hypothesis, Response, response, run_case
 from rsea_ros.experiment.proposal import DesignRequest
-from rsea_ros.experiment.run_shape import (
-    FEWEST,
-    RunLimits,
-    Shape,
-    command_of,
-    largest_share,
-    of_command,
-    of_response,
-)
+from rsea_ros.experiment.run_shape import FEWEST, Shape, command_of
 from rsea_ros.identification.problem import Case
 from rsea_ros.identification.solver import Map, descend, jacobian, power, serial
 from rsea_ros.model.rig import Sensor
@@ -51,7 +43,7 @@ class ShapeRater:
         scaled = replace(shape, amplitude=shape.amplitude * size, bias=shape.bias * size)
         command = command_of(scaled, duration, rate, limits.slew)
         for _ in range(3):
-            share = max(share_of_limits(h, command, rate, limits) for h in self.hypotheses)
+            share = max(h.share_of(limits, command, rate) for h in self.hypotheses)
             if share <= INSIDE * 1.05:
                 break
             command = command * (INSIDE / share if math.isfinite(share) else 0.5)
@@ -65,12 +57,6 @@ class ShapeRater:
     def case(self, command: FloatArray, *, is_quick: bool) -> Case:
         """Return a run of a command, not yet made."""
         return run_case(command, self.asked.rate, self.noise, is_quick=is_quick)
-
-
-def share_of_limits(hypothesis: Hypothesis, command: FloatArray, rate: float, limits: RunLimits) -> float:
-    """Return the share of the limits that a command uses at the likeliest values."""
-    outputs = motion(hypothesis.rig_at(hypothesis.if_there()), command, rate)
-    return largest_share(of_response(command, outputs) | of_command(command, rate), limits)
 
 
 def noise_by_channel(hypotheses: Sequence[Hypothesis], measured: Mapping[str, float]) -> dict[str, float]:

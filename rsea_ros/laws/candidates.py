@@ -143,13 +143,9 @@ def terms_for(cases: Sequence[CaseModel]) -> tuple[terms.Term, ...]:
     """Return the terms that may act on a machine, the waves at the periods that the first record shows."""
     model = cases[0]
     made: list[terms.Term] = [
-        *terms.GEAR_TERMS,
-        *terms.COMMAND_TERMS,
-        *terms.MOTOR_TERMS,
-        *terms.SPRING_TERMS, *terms.LOAD_TERMS,
-        *terms.SENSOR_TERMS,
-        *terms.ENCODER_TERMS,
-    ]
+        *terms.GEAR_TERMS, *terms.COMMAND_TERMS, *terms.MOTOR_TERMS, *terms.SPRING_TERMS, *terms.LOAD_TERMS,
+        *terms.SENSOR_TERMS, *terms.ENCODER_TERMS,
+    ]  # fmt: skip
     for cycles in wave_numbers(model):
         made += terms.wave_terms(cycles)
     for cycles in wave_numbers(model, "d"):

@@ -13,11 +13,11 @@ from rsea_ros.documents.wording import list_names
 from rsea_ros.effects.catalogue import lend
 from rsea_ros.identification.solver import one_blas_thread
 from rsea_ros.laws import choice as choices
-from rsea_ros.laws.candidates import SPLINES, TermCandidate, basis_of, spline_knots
+from rsea_ros.laws.candidates import SPLINES, basis_of, spline_knots
 from rsea_ros.laws.effect_source import LawProvenance
 from rsea_ros.laws.file import Draft, Refined, draft_of, finish_laws, refine
 from rsea_ros.laws.law import FittedTerm, Law, LawResult, LearntCurve, ranges_of
-from rsea_ros.laws.sparse_regression import SELECTION, Dependence, Gram, SparseLaw, dependences
+from rsea_ros.laws.sparse_regression import SELECTION, Dependence, SparseLaw, dependences
 from rsea_ros.laws.variables import CaseModel
 from rsea_ros.model.rig import EffectSetting, Rig
 from rsea_ros.progress import Progress
@@ -93,11 +93,9 @@ _POINTS = 41
 _RIDGE = 1e-4
 
 
-def law_of(
-    gram: Gram, candidates: Sequence[TermCandidate], cases: Sequence[CaseModel], models: Sequence[SparseLaw]
-) -> list[Law]:
+def law_of(search: choices.Search, models: Sequence[SparseLaw]) -> list[Law]:
     """Return the laws of some models fitted together, those of one place as one."""
-    first = len(gram.prior)
+    gram, candidates, first = search.gram, search.candidates, len(search.gram.prior)
     columns = [k for m in models for k in m.columns]
     if not columns:
         return []
@@ -113,35 +111,30 @@ def law_of(
     for place, items in parts.items():
         regressor = list_names(list(dict.fromkeys(p.term.regressor for p in items)))
         name = _name_with_place(f"law_of_{_slug(items[0].term.regressor)}", place)
-        law = Law(name, items[0].term.place, regressor, tuple(items), {})
-        laws.append(replace(law, ranges=ranges_of(law, _all_letters(cases))))
+        laws.append(_with_ranges(Law(name, items[0].term.place, regressor, tuple(items), {}), search.cases))
     return laws
 
 
-def curve_of(
-    gram: Gram, candidates: Sequence[TermCandidate], cases: Sequence[CaseModel], dependence: Dependence
-) -> Law:
+def curve_of(search: choices.Search, dependence: Dependence) -> Law:
     """Return the learnt law of a dependence: its spline, as points of a curve."""
-    first, place = len(gram.prior), dependence.place
+    gram, candidates, first = search.gram, search.candidates, len(search.gram.prior)
+    place = dependence.place
     columns = [first + k for k, c in enumerate(candidates)
                if c.part and (c.place, c.regressor) == (place, dependence.regressor)]  # fmt: skip
     beta = gram.fit(np.array(columns), SELECTION, _RIDGE)[first:] / gram.scale[columns]
     spline = next(s for s in SPLINES if (s.place, s.regressor) == (place, dependence.regressor))
-    knots = spline_knots(cases, spline)
+    knots = spline_knots(search.cases, spline)
     x = np.linspace(knots[0], knots[-1], _POINTS)
     used = [c.part[2] for k in columns if (c := candidates[k - first]).part]
     curve = LearntCurve(spline.over, spline.factor, x, beta @ basis_of(x, knots)[used])
-    law = Law(
-        _name_with_place(f"learnt_law_of_{_slug(dependence.regressor)}", place), place,
-        dependence.regressor, (), {}, curve,
-    )
-    return replace(law, ranges=ranges_of(law, _all_letters(cases)))
+    name = _name_with_place(f"learnt_law_of_{_slug(dependence.regressor)}", place)
+    return _with_ranges(Law(name, place, dependence.regressor, (), {}, curve), search.cases)
 
 
-def _all_letters(cases: Sequence[CaseModel]) -> dict[str, np.ndarray]:
-    return {
-        n: np.concatenate([c.variables.letters[n] for c in cases]) for n in cases[0].variables.letters
-    }
+def _with_ranges(law: Law, cases: Sequence[CaseModel]) -> Law:
+    by_case = [c.variables.letters for c in cases]
+    letters = {n: np.concatenate([each[n] for each in by_case]) for n in by_case[0]}
+    return replace(law, ranges=ranges_of(law, letters))
 
 
 def _slug(text: str) -> str:
@@ -182,8 +175,7 @@ def learn(
 
 def nothing_left(base: choices.Base, records: Sequence[Record]) -> LawResult:
     """Return the result where the base model is at the noise floor."""
-    before, noise = base.levels()
-    rig = base.rig
+    (before, noise), rig = base.levels(), base.rig
     duration = sum(c.duration for c in base.cases)
     return LawResult(rig.name, tuple(r.source for r in records), duration, rig, rig,
                      (), (), (), 0.0, (0.0, 0.0), 0.0, before, before, noise, at_floor=True)  # fmt: skip
@@ -194,10 +186,9 @@ def _result(
     provenance: LawProvenance | None,
 ) -> LawResult:  # fmt: skip
     base = search.base
-    gram, candidates, cases = search.gram, search.candidates, search.cases
-    laws = law_of(gram, candidates, cases, choice.taken)
+    laws = law_of(search, choice.taken)
     if choice.curve is not None:
-        laws = [curve_of(gram, candidates, cases, choice.curve)]
+        laws = [curve_of(search, choice.curve)]
     drafts = [draft_of(law) for law in laws]
     with lend(*(d.effect for d in drafts)):
         refined = refined_laws(base, drafts) if drafts else None
@@ -205,8 +196,7 @@ def _result(
         if refined is None or not (gain >= choices.MATTERS and ci95[0] > 0.0):
             return replace(nothing_left(base, records), dependences=tuple(depends), at_floor=False,
                            tried=choices.summarize_models(search, choice, ()))  # fmt: skip
-        before, noise = base.levels()
-        after = refined.levels()[0]
+        (before, noise), (after, _) = base.levels(), refined.levels()
         written = finish_laws(drafts, refined, provenance, gain, ci95)
         rigs = base.rig, refined.rig
     acting = {e.name for e in rigs[0].effects}

@@ -75,40 +75,37 @@ _NARROW = (0.03, 0.07, 0.15, 0.3)
 _SLOW = (2.0, 6.0, 20.0, 60.0)
 _FAST = (0.001, 0.002, 0.004, 0.008, 0.015, 0.03)
 
-
-def _gear() -> tuple[Term, ...]:
-    g: Place = "gear"
-    speed, both = "speed", "speed and load"
-    return (
-        Term("offset", g, "a constant", "1.0", "1", "N m"),
-        Term("coulomb", g, speed, "1.0", "sign(ω)", "N m", is_drag=True, friction=True),
-        Term("stribeck", g, speed, "exp(-(w / a) * (w / a))", "exp(-(ω/{a})²)·sign(ω)", "N m",
-             "stribeck_velocity", "rad/s", "w", _NARROW, is_drag=True, friction=True),
-        Term("saturating_drag", g, speed, "-tanh(w / a)", "-tanh(ω/{a})", "N m", "drag_width", "rad/s", "w",
-             (0.07, 0.15, 0.3, 0.6), is_drag=True),
-        Term("viscous_difference", g, speed, "-abs(w)", "-|ω|", "N m s/rad"),
-        Term("quadratic_drag", g, speed, "-w * abs(w)", "-ω·|ω|", "N m s^2/rad^2", is_drag=True),
-        Term("even_drag", g, speed, "-w * w", "-ω²", "N m s^2/rad^2"),
-        Term("forward_drag", g, speed, "-max(w, 0.0) * w", "-ω·max(ω, 0)", "N m s^2/rad^2", is_drag=True),
-        Term("backward_drag", g, speed, "-min(w, 0.0) * abs(w)", "-|ω|·min(ω, 0)", "N m s^2/rad^2",
-             is_drag=True),
-        Term("cubic_drag", g, speed, "-w * w * w", "-ω³", "N m s^3/rad^3", is_drag=True),
-        Term("load_friction", g, both, "abs(T)", "|T_s|·sign(ω)", "1", is_drag=True, friction=True),
-        Term("load_drag", g, both, "-abs(T) * w", "-|T_s|·ω", "s/rad", is_drag=True),
-        Term("command_friction", g, "speed and command", "abs(u)", "|T_m|·sign(ω)", "1", is_drag=True,
-             friction=True),
-        Term("drift_drag", g, "speed and time", "-share * w", "-(t/duration)·ω", "N m s/rad"),
-        Term("drift_friction", g, "speed and time", "share", "(t/duration)·sign(ω)", "N m", friction=True),
-        Term("drift", g, "time", "share", "t/duration", "N m"),
-        Term("spread_friction", g, "speed and position", "abs(q)", "|q|·sign(ω)", "N m/rad", friction=True),
-        Term("wide_friction", g, "speed and position", "q * q", "q²·sign(ω)", "N m/rad^2", friction=True),
-        Term("lean", g, "position", "q", "q", "N m/rad"),
-        Term("weight_at_gear", g, "position", "-sin(q)", "-sin(q)", "N m"),
-        Term("bow", g, "position", "q * q", "q²", "N m/rad^2"),
-        Term("cubic_angle", g, "position", "q * q * q", "q³", "N m/rad^3"),
-        Term("presliding", g, "position's past", "-m", "-z(q)", "N m", "bristle_angle", "rad", "q",
-             (0.01, 0.03, 0.1, 0.3), memory="dahl", is_drag=True),
-    )  # fmt: skip
+GEAR_TERMS = (
+    Term("offset", "gear", "a constant", "1.0", "1", "N m"),
+    Term("coulomb", "gear", "speed", "1.0", "sign(ω)", "N m", is_drag=True, friction=True),
+    Term("stribeck", "gear", "speed", "exp(-(w / a) * (w / a))", "exp(-(ω/{a})²)·sign(ω)", "N m",
+         "stribeck_velocity", "rad/s", "w", _NARROW, is_drag=True, friction=True),
+    Term("saturating_drag", "gear", "speed", "-tanh(w / a)", "-tanh(ω/{a})", "N m", "drag_width", "rad/s",
+         "w", (0.07, 0.15, 0.3, 0.6), is_drag=True),
+    Term("viscous_difference", "gear", "speed", "-abs(w)", "-|ω|", "N m s/rad"),
+    Term("quadratic_drag", "gear", "speed", "-w * abs(w)", "-ω·|ω|", "N m s^2/rad^2", is_drag=True),
+    Term("even_drag", "gear", "speed", "-w * w", "-ω²", "N m s^2/rad^2"),
+    Term("forward_drag", "gear", "speed", "-max(w, 0.0) * w", "-ω·max(ω, 0)", "N m s^2/rad^2", is_drag=True),
+    Term("backward_drag", "gear", "speed", "-min(w, 0.0) * abs(w)", "-|ω|·min(ω, 0)", "N m s^2/rad^2",
+         is_drag=True),
+    Term("cubic_drag", "gear", "speed", "-w * w * w", "-ω³", "N m s^3/rad^3", is_drag=True),
+    Term("load_friction", "gear", "speed and load", "abs(T)", "|T_s|·sign(ω)", "1", is_drag=True,
+         friction=True),
+    Term("load_drag", "gear", "speed and load", "-abs(T) * w", "-|T_s|·ω", "s/rad", is_drag=True),
+    Term("command_friction", "gear", "speed and command", "abs(u)", "|T_m|·sign(ω)", "1", is_drag=True,
+         friction=True),
+    Term("drift_drag", "gear", "speed and time", "-share * w", "-(t/duration)·ω", "N m s/rad"),
+    Term("drift_friction", "gear", "speed and time", "share", "(t/duration)·sign(ω)", "N m", friction=True),
+    Term("drift", "gear", "time", "share", "t/duration", "N m"),
+    Term("spread_friction", "gear", "speed and position", "abs(q)", "|q|·sign(ω)", "N m/rad", friction=True),
+    Term("wide_friction", "gear", "speed and position", "q * q", "q²·sign(ω)", "N m/rad^2", friction=True),
+    Term("lean", "gear", "position", "q", "q", "N m/rad"),
+    Term("weight_at_gear", "gear", "position", "-sin(q)", "-sin(q)", "N m"),
+    Term("bow", "gear", "position", "q * q", "q²", "N m/rad^2"),
+    Term("cubic_angle", "gear", "position", "q * q * q", "q³", "N m/rad^3"),
+    Term("presliding", "gear", "position's past", "-m", "-z(q)", "N m", "bristle_angle", "rad", "q",
+         (0.01, 0.03, 0.1, 0.3), memory="dahl", is_drag=True),
+)  # fmt: skip
 
 
 def _command(port: Place) -> tuple[Term, ...]:
@@ -137,49 +134,37 @@ def _command(port: Place) -> tuple[Term, ...]:
              memory="delay"),
     )  # fmt: skip
 
+SPRING_TERMS = (
+    Term("lopsided", "spring", "deflection", "d * d", "d²", "N m/rad^2"),
+    Term("even_spring", "spring", "deflection", "abs(d)", "|d|", "N m/rad"),
+    Term("quadratic_spring", "spring", "deflection", "d * abs(d)", "d·|d|", "N m/rad^2"),
+    Term("cubic_spring", "spring", "deflection", "d * d * d", "d³", "N m/rad^3"),
+    Term("quintic_spring", "spring", "deflection", "d * d * d * d * d", "d⁵", "N m/rad^5"),
+    Term("stop", "spring", "deflection", "d - min(max(d, -a), a)", "(d - clip(d, ±{a}))", "N m/rad",
+         "stop_angle", "rad", "d", (0.3, 0.45, 0.6, 0.75, 0.9)),
+    Term("slack", "spring", "deflection", "min(max(d, -a), a)", "clip(d, ±{a})", "N m/rad", "slack_angle",
+         "rad", "d", (0.03, 0.07, 0.15, 0.25)),
+    Term("fading_spring", "spring", "deflection and time", "share * d", "(t/duration)·d", "N m/rad"),
+    Term("hysteresis", "spring", "deflection's past", "m", "z(d)", "N m", "hysteresis_angle", "rad", "d",
+         (0.03, 0.1, 0.2, 0.4), memory="dahl"),
+    Term("play", "spring", "deflection's past", "m", "play(d, {a})", "N m/rad", "play_angle", "rad", "d",
+         (0.03, 0.1, 0.2, 0.4), memory="play"),
+)  # fmt: skip
 
-def _spring() -> tuple[Term, ...]:
-    p: Place = "spring"
-    deflection = "deflection"
-    return (
-        Term("lopsided", p, deflection, "d * d", "d²", "N m/rad^2"),
-        Term("even_spring", p, deflection, "abs(d)", "|d|", "N m/rad"),
-        Term("quadratic_spring", p, deflection, "d * abs(d)", "d·|d|", "N m/rad^2"),
-        Term("cubic_spring", p, deflection, "d * d * d", "d³", "N m/rad^3"),
-        Term("quintic_spring", p, deflection, "d * d * d * d * d", "d⁵", "N m/rad^5"),
-        Term("stop", p, deflection, "d - min(max(d, -a), a)", "(d - clip(d, ±{a}))", "N m/rad", "stop_angle",
-             "rad", "d", (0.3, 0.45, 0.6, 0.75, 0.9)),
-        Term("slack", p, deflection, "min(max(d, -a), a)", "clip(d, ±{a})", "N m/rad", "slack_angle", "rad",
-             "d", (0.03, 0.07, 0.15, 0.25)),
-        Term("fading_spring", p, "deflection and time", "share * d", "(t/duration)·d", "N m/rad"),
-        Term("hysteresis", p, "deflection's past", "m", "z(d)", "N m", "hysteresis_angle", "rad", "d",
-             (0.03, 0.1, 0.2, 0.4), memory="dahl"),
-        Term("play", p, "deflection's past", "m", "play(d, {a})", "N m/rad", "play_angle", "rad", "d",
-             (0.03, 0.1, 0.2, 0.4), memory="play"),
-    )  # fmt: skip
-
-
-def _sensors() -> tuple[Term, ...]:
-    s: Place = "ft"
-    load = "the sensor's torque"
-    return (
-        Term("ft_bias", s, "a constant, at the sensor", "1.0", "1", "N m"),
-        Term("ft_gain", s, load, "T", "T", "1"),
-        Term("ft_even", s, load, "abs(T)", "|T|", "1"),
-        Term("ft_quadratic", s, load, "T * T", "T²", "1/(N m)"),
-        Term("ft_cubic", s, load, "T * T * T", "T³", "1/(N m)^2"),
-        Term("ft_drift", s, "time, at the sensor", "share", "t/duration", "N m"),
-        Term("ft_settling", s, "time, at the sensor", "1.0 - exp(-t / a)", "(1 - exp(-t/{a}))", "N m",
-             "settling_time", "s", "", (1.0, 3.0, 8.0, 20.0)),
-        Term("ft_fading", s, "the sensor's torque and time", "share * T", "(t/duration)·T", "1"),
-        Term("ft_lag", s, "the sensor's past", "m - T", "(lag(T) - T)", "1", "ft_time_constant", "s", "",
-             _FAST, memory="lag"),
-    )  # fmt: skip
-
-
-MOTOR_TERMS = _command("motor")
-COMMAND_TERMS = _command("command")
-GEAR_TERMS, SPRING_TERMS, SENSOR_TERMS = _gear(), _spring(), _sensors()
+SENSOR_TERMS = (
+    Term("ft_bias", "ft", "a constant, at the sensor", "1.0", "1", "N m"),
+    Term("ft_gain", "ft", "the sensor's torque", "T", "T", "1"),
+    Term("ft_even", "ft", "the sensor's torque", "abs(T)", "|T|", "1"),
+    Term("ft_quadratic", "ft", "the sensor's torque", "T * T", "T²", "1/(N m)"),
+    Term("ft_cubic", "ft", "the sensor's torque", "T * T * T", "T³", "1/(N m)^2"),
+    Term("ft_drift", "ft", "time, at the sensor", "share", "t/duration", "N m"),
+    Term("ft_settling", "ft", "time, at the sensor", "1.0 - exp(-t / a)", "(1 - exp(-t/{a}))", "N m",
+         "settling_time", "s", "", (1.0, 3.0, 8.0, 20.0)),
+    Term("ft_fading", "ft", "the sensor's torque and time", "share * T", "(t/duration)·T", "1"),
+    Term("ft_lag", "ft", "the sensor's past", "m - T", "(lag(T) - T)", "1", "ft_time_constant", "s", "",
+         _FAST, memory="lag"),
+)  # fmt: skip
+MOTOR_TERMS, COMMAND_TERMS = _command("motor"), _command("command")
 LOAD_TERMS = (
     Term("weight", "load", "the load's angle", "-sin(h)", "-sin(φ)", "N m"),
     Term("tilt", "load", "the load's angle", "-cos(h)", "-cos(φ)", "N m"),
