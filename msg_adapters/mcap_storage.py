@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from msg_adapters import mcap_records as mcap
+from msg_adapters import mcap_file as mcap
 from msg_adapters.contents import NAME as REMARKS
 from msg_adapters.topic_map import definition
 from rsea_ros.outputs.files import create, write_at
@@ -81,17 +81,14 @@ class McapStorage:
             start = len(self._chunk) - ends[first] + sizes[first]
             stop = min(int(np.searchsorted(start + ends, CHUNK_SIZE)) + 1, len(raws))
             part = slice(first, stop)
-            self._add_places(keys[part], log_times[part], start + ends[part] - sizes[part])
+            places = np.column_stack((log_times[part], (start + ends - sizes)[part])).astype("<u8")
+            for key in np.unique(keys[part]):
+                self._index.setdefault(int(key), bytearray()).extend(places[keys[part] == key].tobytes())
+            self._extend_span(int(log_times[part].min()), int(log_times[part].max()))
             self._chunk += b"".join(chain.from_iterable(zip(heads[part], raws[part], strict=True)))
             if len(self._chunk) >= CHUNK_SIZE:
                 self.flush()
             first = stop
-
-    def _add_places(self, keys: IntArray, log_times: IntArray, offsets: IntArray) -> None:
-        places = np.column_stack((log_times, offsets)).astype("<u8")
-        for key in np.unique(keys):
-            self._index.setdefault(int(key), bytearray()).extend(places[keys == key].tobytes())
-        self._extend_span(int(log_times.min()), int(log_times.max()))
 
     def _extend_span(self, first: int, last: int) -> None:
         known = self._span or (first, last)

@@ -141,12 +141,6 @@ def _text(data: bytes | str) -> str:
     return data.decode(errors="replace") if isinstance(data, bytes) else data
 
 
-_INSERT_TOPIC = "INSERT INTO topics VALUES (NULL, ?, ?, 'cdr', '[]', ?)"
-_INSERT_DEFINITION = "INSERT INTO message_definitions VALUES (NULL, ?, 'ros2msg', ?, ?)"
-_INSERT_METADATA = f"INSERT INTO metadata VALUES (NULL, {metadata.VERSION}, ?)"
-_INSERT_MESSAGE = "INSERT INTO messages VALUES (NULL, ?, ?, ?)"
-
-
 class SqliteStorage:
     """One sqlite3 file being written (see writing.STORAGES)."""
 
@@ -167,8 +161,10 @@ class SqliteStorage:
         with _system_errors():
             if msgtype not in self._types:
                 self._types.add(msgtype)
-                self._database.execute(_INSERT_DEFINITION, (msgtype, text, digest))
-            return int(self._database.execute(_INSERT_TOPIC, (topic, msgtype, digest)).lastrowid or 0)
+                row = "INSERT INTO message_definitions VALUES (NULL, ?, 'ros2msg', ?, ?)"
+                self._database.execute(row, (msgtype, text, digest))
+            row = "INSERT INTO topics VALUES (NULL, ?, ?, 'cdr', '[]', ?)"
+            return int(self._database.execute(row, (topic, msgtype, digest)).lastrowid or 0)
 
     def write(self, key: int, log_time: int, raw: bytes) -> None:
         """Append a serialised message."""
@@ -181,7 +177,7 @@ class SqliteStorage:
     def flush(self) -> None:
         """Commit the messages. Raises OSError when the disk is full."""
         with _system_errors():
-            self._database.executemany(_INSERT_MESSAGE, self._rows)
+            self._database.executemany("INSERT INTO messages VALUES (NULL, ?, ?, ?)", self._rows)
             self._database.commit()
         self._rows.clear()
 
@@ -191,7 +187,7 @@ class SqliteStorage:
     def remark(self, texts: Mapping[str, str], known: str) -> None:
         """Keep the metadata of the bag, which hold the texts too, where rosbag2 keeps them."""
         with _system_errors():
-            self._database.execute(_INSERT_METADATA, (known,))
+            self._database.execute(f"INSERT INTO metadata VALUES (NULL, {metadata.VERSION}, ?)", (known,))
 
     def close(self) -> None:
         """Commit the rest."""

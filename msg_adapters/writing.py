@@ -75,7 +75,11 @@ class BagWriter:
                 self._made = files.make_folder(self.path.parent)
                 self.partial = self._new_directory()
                 self._made.insert(0, self.partial)
-                self._open()
+                suffix, opened = STORAGES[self._kind]
+                name = self.path.stem if self._single else self.path.name
+                self._storage = opened(self.partial / f"{name}{suffix}")
+                for folder in (self.partial, self.path.parent) if self._recording else ():
+                    files.sync(folder)
         except OSError as error:
             self._clear()
             raise BagError(f"{error.filename or self.path}: cannot be made: {error.strerror}") from None
@@ -192,13 +196,6 @@ class BagWriter:
                     path.mkdir()
                     break
         return path
-
-    def _open(self) -> None:
-        suffix, opened = STORAGES[self._kind]
-        name = self.path.stem if self._single else self.path.name
-        self._storage = opened(self.partial / f"{name}{suffix}")
-        for folder in (self.partial, self.path.parent) if self._recording else ():
-            files.sync(folder)
 
     def _complete(self) -> None:
         """Close the file, add the metadata, and move everything to its name."""

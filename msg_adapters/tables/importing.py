@@ -109,13 +109,11 @@ def import_records(
     Raises as import_record does.
     """
     maps = [mapping.at(index) for index in indices]
-    tables = {name: _table(_file(Path(path), name, mapping), name, maps) for name in mapping.files}
+    files = {name: _file(Path(path), name, mapping) for name in mapping.files}
+    tables = {name: _table(file, name, maps) for name, file in files.items()}
     for index, joint in zip(indices, maps, strict=True):
         for run in _runs(path, tables, joint):
-            parts = [
-                _part(_file(Path(path), name, mapping), table, joint.of_file(name), run)
-                for name, table in tables.items()
-            ]
+            parts = [_part(files[name], table, joint.of_file(name), run) for name, table in tables.items()]
             with _name_errors(path, mapping, run):
                 record = _record(path, parts, joint)
             yield Imported(record, joint, index, run)
@@ -223,9 +221,9 @@ def summary(record: Record, mapping: ImportMap) -> list[str]:
     for name, channel in record.channels.items():
         terms = mapping.channels[name]
         columns = " + ".join(f"{term.column} [{plain(canonical(term.unit)) or 1}]" for term in terms)
-        low, high = channel.y.min(), channel.y.max()
+        span = f"{channel.y.min():.6g} to {channel.y.max():.6g}"
         si = plain(in_motion(UNITS[name], linear=linear))
-        lines.append(f"{name}: {len(channel)} samples of {columns}, {low:.6g} to {high:.6g} {si}")
+        lines.append(f"{name}: {len(channel)} samples of {columns}, {span} {si}")
     if record.driving is None and not mapping.set_points:
         lines.append(
             "no command: `check` compares the channels; for `identify` and `diagnose` map the commanded"
@@ -285,13 +283,11 @@ def _held(table: Table, where: RowFilter) -> str:
 
 
 def _rows_left_out(path: str | Path, table: Table, undated: int) -> Iterator[Fault]:
-    name = Path(path).name
-    if table.left_out:
-        detail = f"{table.left_out} of {table.rows} rows left out: {table.first}"
-        yield Fault("rows_left_out", name, table.left_out / table.rows, detail)
-    if undated:
-        detail = f"{undated} of {table.rows} rows left out: no stamp, or no value to choose rows by"
-        yield Fault("rows_left_out", name, undated / table.rows, detail)
+    no_stamp = "no stamp, or no value to choose rows by"
+    for count, reason in ((table.left_out, table.first), (undated, no_stamp)):
+        if count:
+            detail = f"{count} of {table.rows} rows left out: {reason}"
+            yield Fault("rows_left_out", Path(path).name, count / table.rows, detail)
 
 
 def _channel(

@@ -135,17 +135,13 @@ class ChannelTerm:
 
 
 def terms_of(channel: str, value: object) -> tuple[ChannelTerm, ...]:
-    parts = value if isinstance(value, list) else [value]
+    parts, where = value if isinstance(value, list) else [value], f"channels.{channel}"
     if not parts:
-        raise FieldError(
-            f"channels.{channel} is an empty list, expected a column or more", f"channels.{channel}"
-        )
-    fields = [f"channels.{channel}" + (f"[{i}]" if value is parts else "") for i in range(len(parts))]
+        raise FieldError(f"{where} is an empty list, expected a column or more", where)
+    fields = [where + (f"[{i}]" if value is parts else "") for i in range(len(parts))]
     terms = tuple(term_of(field, part, CHANNELS[channel]) for field, part in zip(fields, parts, strict=True))
     if len({term.file for term in terms}) > 1:
-        raise FieldError(
-            f"channels.{channel} sums columns of several files, expected one file", f"channels.{channel}"
-        )
+        raise FieldError(f"{where} sums columns of several files, expected one file", where)
     return terms
 
 
@@ -158,11 +154,8 @@ def term_of(where: str, value: object, dimension: str) -> ChannelTerm:
     except ValueError as error:
         raise FieldError(f"{where}: {error}", f"{where}.unit") from None
     if LINEAR.get(stated_dimension, stated_dimension) != dimension and "scale" not in body:
-        raise FieldError(
-            f"{where}: unit {body['unit']!r} is a {stated_dimension}, expected a {dimension}, "
-            "or a scale to it",
-            f"{where}.unit",
-        )
+        mismatch = f"unit {body['unit']!r} is a {stated_dimension}, expected a {dimension}, or a scale to it"
+        raise FieldError(f"{where}: {mismatch}", f"{where}.unit")
     expression = _expression(body, where)
     column = expression.text if expression else column_name(body["column"], f"{where}.column")
     file, held = body.get("file", ""), body.get("held", False)
@@ -198,9 +191,8 @@ def _gains_and_constants(
     for sign in signs.values():
         expect(sign, f"{where}.sign", sign in (1, -1), "1 or -1")
     if 0.0 in scales.values():
-        raise FieldError(
-            f"{where}.scale is 0, expected another number: the channel would be lost", f"{where}.scale"
-        )
+        key = f"{where}.scale"
+        raise FieldError(f"{key} is 0, expected another number: the channel would be lost", key)
     numbered = [list(values) for values in (signs, scales, constants) if None not in values]
     joints: list[int | None] = max(numbered, key=len, default=[None])
     for name, values in zip(PER_JOINT, (signs, scales, constants), strict=True):

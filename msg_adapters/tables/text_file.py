@@ -91,13 +91,10 @@ def read_text(path: Path, wanted: Wanted) -> Table:
     first, notes = head[at][0] + layout.headed, tuple[str, ...]()
     if at:
         notes = (f"lines {head[0][0]} to {head[at - 1][0]} above the names of the columns are left out",)
-    places = {column: base_and_index(column, layout.names) for column in wanted.columns}
-    indices = {column: layouts.index_in(base, layout.names) for column, (base, _) in places.items()}
+    reader = _Reader(layout, wanted)
     if layout.headed and head[at + 1 :] and is_row_of_texts(layout.cells(head[at + 1][1])):
         number, line = head[at + 1]
         first, notes = number + 1, (*notes, f"line {number} is taken for the units: {brief(line, _LONGEST)}")
-    elements = {column: element for column, (_, element) in places.items()}
-    reader = _Reader(layout, indices, elements, wanted)
     number = 1
     for lines in blocks_of_lines(path):
         rows = [row for row in enumerate(lines, number) if row[0] >= first and layouts.counts(row[1])]
@@ -150,21 +147,16 @@ def _head(path: Path) -> tuple[list[str], list[tuple[int, str]]]:
 class _Reader:
     """Collects columns block by block."""
 
-    def __init__(
-        self, layout: layouts.TextLayout, indices: dict[str, int], elements: dict[str, int | None],
-        wanted: Wanted,
-    ) -> None:  # fmt: skip
-        """elements: by column, which number of a list in its cells, None for cells of one number."""
+    def __init__(self, layout: layouts.TextLayout, wanted: Wanted) -> None:
         self._layout = layout
         self._decimal, self._labels, self._stamps = wanted.decimal, wanted.labels, wanted.stamps
         self._dated: set[str] = set()
-        self._indices = indices
-        self._elements = elements
-        self._has_lists = any(element is not None for element in elements.values())
-        self._parts: dict[str, list[FloatArray | Labels]] = {column: [] for column in indices}
-        self._rows = 0
-        self._left_out = 0
-        self._first = ""
+        places = {column: base_and_index(column, layout.names) for column in wanted.columns}
+        self._indices = {c: layouts.index_in(base, layout.names) for c, (base, _) in places.items()}
+        self._elements = {column: element for column, (_, element) in places.items()}
+        self._has_lists = any(element is not None for element in self._elements.values())
+        self._parts: dict[str, list[FloatArray | Labels]] = {column: [] for column in self._indices}
+        self._rows, self._left_out, self._first = 0, 0, ""
 
     def add(self, rows: list[tuple[int, str]]) -> None:
         """Take a block of lines that count."""
