@@ -1,20 +1,16 @@
 """Bags of all storages, opened and checked."""
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryDirectory
-
-import numpy as np
 
 from msg_adapters import metadata
 from msg_adapters.compression import ERRORS, ZSTD_MAGIC, Allowance, unpack_file, unpack_message
 from msg_adapters.contents import AND, Contents, Messages
 from rsea_ros.documents.wording import brief
 from rsea_ros.errors import BagError
-from rsea_ros.records.record import Fault, FloatArray, IntArray
 
 SCANNERS = {".mcap": "mcap_file", ".db3": "sqlite_file", ".bag": "ros1_file"}
 """By suffix: the module of this package whose `scan` adds the messages of a file to contents."""
@@ -153,43 +149,3 @@ def _unpack(topic: str, messages: Messages, allowance: Allowance, contents: Cont
         share = len(damaged) / len(messages.raw)
         contents.tell("damaged_messages", topic, damaged[0], len(damaged), "messages", share)
     messages.log_times, messages.raw = [t for t, _ in kept], [raw for _, raw in kept]
-
-
-@dataclass(frozen=True)
-class FieldSamples:
-    """One field of one topic: stamps in ns and values, both (n,); `where` is file, topic and field."""
-
-    where: str
-    stamps: IntArray
-    values: FloatArray
-
-
-def check_finite(series: FieldSamples) -> None:
-    """Raises BagError for a value that is not finite."""
-    bad = np.flatnonzero(~np.isfinite(series.values))
-    if bad.size:
-        at, stamp = bad[0], int(series.stamps[bad[0]])
-        raise BagError(
-            f"{series.where}[{at}] is {series.values[at]} at {stamp // 10**9}.{stamp % 10**9:09d} s,"
-            f" expected a finite number ({bad.size} of {series.values.size} are not)"
-        )
-
-
-def on_the_clock_of_the_command(
-    series: Mapping[str, FieldSamples], report: Contents
-) -> dict[str, FieldSamples]:
-    """Leave out channels without a moment in common with the command: their stamps come from another clock.
-
-    A simulation from the command's first stamp to their last would go through all the years between.
-    """
-    if (command := series.get("command")) is None:
-        return dict(series)
-    kept = {}
-    for name, one in series.items():
-        ahead = int(one.stamps.min()) - int(command.stamps.min())
-        if one.stamps.min() <= command.stamps.max() and command.stamps.min() <= one.stamps.max():
-            kept[name] = one
-        else:
-            detail = "left out: no moment in common with the command, its stamps are from another clock"
-            report.faults.append(Fault("clock_offset", name, 1.0, detail, ahead * 1e-9, "s"))
-    return kept

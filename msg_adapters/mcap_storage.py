@@ -50,7 +50,7 @@ class McapStorage:
         """Declare a topic; return its key."""
         if msgtype not in self._types:
             schema = self._types[msgtype] = len(self._types) + 1
-            text = definition(msgtype).text
+            text, _ = definition(msgtype)
             parts = (struct.pack("<H", schema), _text(msgtype), _text("ros2msg" if text else ""), _text(text))
             self._schemas += (record := _record(mcap.SCHEMA, *parts))
             self._chunk += record

@@ -1,7 +1,7 @@
 """Bags to records: topics to channels, header stamps to seconds."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from msg_adapters.decoding import DIAGNOSTICS, Decoded, is_inferred, tell_health
 from msg_adapters.topic_map import FIELDS, READ, ROLES, TYPES, TopicMap, sign_and_index
 from rsea_ros.documents.wording import brief, did_you_mean, list_names
 from rsea_ros.errors import BagError
-from rsea_ros.records.record import IMPORTED, Channel, FloatArray, IntArray, Record
+from rsea_ros.records.record import IMPORTED, Channel, Fault, FloatArray, IntArray, Record
 from rsea_ros.records.stamp_order import far_apart, in_order, stray_fault
 from rsea_ros.records.stamps import repair_stamps
 
@@ -24,6 +24,46 @@ _NEEDED = ((("torque_command",), ("desired_position",)), (("joint_states", "ft")
 
 LATEST = 2**62
 """The highest log time that is believed, ns: the year 2116. Differences of stamps stay within 64 bits."""
+
+
+@dataclass(frozen=True)
+class FieldSamples:
+    """One field of one topic: stamps in ns and values, both (n,); `where` is file, topic and field."""
+
+    where: str
+    stamps: IntArray
+    values: FloatArray
+
+
+def _check_finite(series: FieldSamples) -> None:
+    """Raises BagError for a value that is not finite."""
+    bad = np.flatnonzero(~np.isfinite(series.values))
+    if bad.size:
+        at, stamp = bad[0], int(series.stamps[bad[0]])
+        raise BagError(
+            f"{series.where}[{at}] is {series.values[at]} at {stamp // 10**9}.{stamp % 10**9:09d} s,"
+            f" expected a finite number ({bad.size} of {series.values.size} are not)"
+        )
+
+
+def _on_the_clock_of_the_command(
+    series: Mapping[str, FieldSamples], report: Contents
+) -> dict[str, FieldSamples]:
+    """Leave out channels without a moment in common with the command: their stamps come from another clock.
+
+    A simulation from the command's first stamp to their last would go through all the years between.
+    """
+    if (command := series.get("command")) is None:
+        return dict(series)
+    kept = {}
+    for name, one in series.items():
+        ahead = int(one.stamps.min()) - int(command.stamps.min())
+        if one.stamps.min() <= command.stamps.max() and command.stamps.min() <= one.stamps.max():
+            kept[name] = one
+        else:
+            detail = "left out: no moment in common with the command, its stamps are from another clock"
+            report.faults.append(Fault("clock_offset", name, 1.0, detail, ahead * 1e-9, "s"))
+    return kept
 
 
 def read_record(
@@ -54,7 +94,7 @@ def record_from(contents: Contents, source: str, topics: TopicMap, *, strict: bo
     """Make a record of serialised messages, wherever they came from; see read_record."""
     _require(source, contents, topics, strict)
     report = replace(contents, notes=list(contents.notes), faults=list(contents.faults))
-    series: dict[str, bags.FieldSamples] = {}
+    series: dict[str, FieldSamples] = {}
     roles = [role for role in ROLES if role != "ft" or not is_inferred(contents, topics)]
     if len(roles) < len(ROLES):
         made = f"{topics.topic('ft')}: no sensor's, the stiffness of a rig times {topics.topic('deflection')}"
@@ -66,17 +106,17 @@ def record_from(contents: Contents, source: str, topics: TopicMap, *, strict: bo
     if strict:
         for name, one in series.items():
             if name in ("command", "reference"):
-                bags.check_finite(one)
+                _check_finite(one)
             if repeats := len(one.stamps) - len(np.unique(one.stamps)):
                 repeated = f"{repeats} of {len(one.stamps)} stamps repeat"
                 report.notes.append(f"{one.where}: {repeated}, the first of each kept")
-    series = bags.on_the_clock_of_the_command(series, report)
+    series = _on_the_clock_of_the_command(series, report)
     _require_values(source, series, strict, report)
     tell_health(contents, report, topics.namespace)
     return _record(series, source, report, strict)
 
 
-def _record(series: Mapping[str, bags.FieldSamples], source: str, report: Contents, strict: bool) -> Record:
+def _record(series: Mapping[str, FieldSamples], source: str, report: Contents, strict: bool) -> Record:
     epoch = min(int(one.stamps.min()) for one in series.values())
     channels: dict[str, Channel] = {}
     for name, one in series.items():
@@ -133,7 +173,7 @@ def _topics_text(contents: Contents) -> str:
 
 
 def _require_values(
-    source: str, series: Mapping[str, bags.FieldSamples], strict: bool, report: Contents
+    source: str, series: Mapping[str, FieldSamples], strict: bool, report: Contents
 ) -> None:
     """Refuse messages whose arrays are empty where values are needed, and measurements of another clock."""
     if strict and "command" not in series and "reference" not in series:
@@ -147,7 +187,7 @@ def _require_values(
 
 def _series(
     source: str, role: str, messages: Messages, topics: TopicMap, report: Contents
-) -> dict[str, bags.FieldSamples]:
+) -> dict[str, FieldSamples]:
     """Decode one topic: channel -> series. A field that no message fills is left out."""
     topic = topics.topic(role)
     where = f"{source}: {topic}"
@@ -161,7 +201,7 @@ def _series(
     series = {}
     for channel, field in FIELDS[role].items():
         filled = decoded.filled[field]
-        one = bags.FieldSamples(f"{where} {field}", stamps[filled], decoded.values[field][filled])
+        one = FieldSamples(f"{where} {field}", stamps[filled], decoded.values[field][filled])
         if np.isnan(one.values).all():
             if one.values.size:
                 report.notes.append(f"{one.where}: not a number in every message, taken as not measured")
@@ -169,7 +209,7 @@ def _series(
         stray = far_apart(one.stamps)
         if stray.any():
             report.faults.append(stray_fault(stray, channel))
-            one = bags.FieldSamples(one.where, one.stamps[~stray], one.values[~stray])
+            one = FieldSamples(one.where, one.stamps[~stray], one.values[~stray])
         series[channel] = one
     return series
 

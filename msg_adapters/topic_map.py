@@ -6,7 +6,6 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
-from typing import NamedTuple
 
 from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.store import Typestore
@@ -129,20 +128,13 @@ class TopicMap:
         return renamed
 
 
-class Definition(NamedTuple):
-    """Message definition (empty for a type that nobody knows here) and its RIHS01 hash."""
-
-    text: str
-    digest: str
-
-
 @cache
-def definition(msgtype: str) -> Definition:
-    """Return the definition of a message type of ROS 2 Kilted."""
+def definition(msgtype: str) -> tuple[str, str]:
+    """Return definition and RIHS01 hash of a message type of ROS 2 Kilted, empty for one that is unknown."""
     store = typestore()
     if msgtype not in store.types:
-        return Definition("", "")
-    return Definition(store.generate_msgdef(msgtype, ros_version=2)[0], store.hash_rihs01(msgtype))
+        return "", ""
+    return store.generate_msgdef(msgtype, ros_version=2)[0], store.hash_rihs01(msgtype)
 
 
 @cache

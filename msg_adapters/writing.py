@@ -117,7 +117,7 @@ class BagWriter:
         """Return key and topic, declared. Raises BagError for a topic of another type than before."""
         if topic not in self._topics:
             check_topic(topic)
-            known = Topic(topic, msgtype, definition(msgtype).digest)
+            known = Topic(topic, msgtype, definition(msgtype)[1])
             self._topics[topic] = (self._storage.add(topic, msgtype), known)
         key, known = self._topics[topic]
         if known.msgtype != msgtype:

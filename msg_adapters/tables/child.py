@@ -18,7 +18,7 @@ import tempfile
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 import numpy as np
 
@@ -147,11 +147,11 @@ def _vector(output: IO[bytes], size: int) -> FloatArray:
     return vector
 
 
-def finite_table(vectors: dict[str, FloatArray]) -> Table:
-    """Return a table of vectors of one length. Raises ValueError for an infinite number."""
+def finite_table(vectors: dict[str, FloatArray], **more: Any) -> Table:
+    """Return a table of vectors of one length. more: its other fields. Raises ValueError for infinity."""
     checked_lengths({name: vector.size for name, vector in vectors.items()})
     for name, vector in vectors.items():
         at = int(np.argmax(np.isinf(vector)))
         if np.isinf(vector[at]):
             raise ValueError(f"{name}[{at}] is {vector[at]}, expected a finite number")
-    return Table(vectors, next(iter(vectors.values())).size)
+    return Table(vectors, next(iter(vectors.values())).size, **more)

@@ -9,7 +9,6 @@ import json
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -55,7 +54,7 @@ def read_json(path: Path, wanted: Wanted) -> Table:
     checked_lengths({column: len(c) for column, c in cells.items()})
     numbers = np.repeat(np.arange(1.0, len(lengths) + 1), lengths)
     trials = (_list_of(document, next(iter(places.values())).base), numbers) if lengths else None
-    return replace(finite_table(vectors), labels=labels, dated=dated, trials=trials)
+    return finite_table(vectors, labels=labels, dated=dated, trials=trials)
 
 
 def _document(path: Path) -> Any:

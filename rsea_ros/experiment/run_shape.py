@@ -18,13 +18,7 @@ from rsea_ros.documents.strict_yaml import is_decimal
 from rsea_ros.documents.units import plain
 from rsea_ros.documents.wording import did_you_mean, quote
 from rsea_ros.errors import ParameterError
-from rsea_ros.identification.excitation import (
-    FEWEST_SAMPLES,
-    NYQUIST_SHARE,
-    ExcitationSettings,
-    chirp,
-    ramp_ends,
-)
+from rsea_ros.identification import excitation
 from rsea_ros.records.record import FloatArray
 
 UNITS: Mapping[str, str] = {
@@ -149,8 +143,9 @@ def read_run(path: str | Path) -> tuple[FloatArray, float]:
         rows = np.array([[float(v) for v in line.split(",")] for line in lines[1:] if line.strip()])
     except ValueError as error:
         raise ParameterError(f"{path}: {error}, expected two numbers a line") from None
-    if rows.ndim != 2 or rows.shape[1] != 2 or len(rows) < FEWEST_SAMPLES or not np.isfinite(rows).all():
-        raise ParameterError(f"{path}: expected {FEWEST_SAMPLES} lines or more of two finite numbers")
+    fewest = excitation.FEWEST_SAMPLES
+    if rows.ndim != 2 or rows.shape[1] != 2 or len(rows) < fewest or not np.isfinite(rows).all():
+        raise ParameterError(f"{path}: expected {fewest} lines or more of two finite numbers")
     periods = np.diff(rows[:, 0])
     if not periods.min() > 0.0 or np.ptp(periods) > _UNEVEN * periods.mean():
         raise ParameterError(
@@ -197,7 +192,7 @@ def command_of(shape: Shape, duration: float, rate: float, slew: float = np.inf)
     n = round(duration * rate)
     moving = n - round(shape.rest * n)
     part = KINDS[shape.kind](shape, moving, rate)
-    run = ramp_ends(shape.bias + shape.amplitude * part, min(round(RAMP * rate), moving // 4))
+    run = excitation.ramp_ends(shape.bias + shape.amplitude * part, min(round(RAMP * rate), moving // 4))
     if np.isfinite(slew):
         run = slow(run, slew / rate, is_stepped=shape.kind in ("steps", "holds"))
     return at_rest_around(np.concatenate([run, np.zeros(n - moving)]), rate)
@@ -217,7 +212,7 @@ def slow(command: FloatArray, most: float, *, is_stepped: bool) -> FloatArray:
         return command * (most / change)
     width = int(np.ceil(change / most))
     smooth: FloatArray = np.convolve(command, np.full(width, 1.0 / width))[: len(command)]
-    return ramp_ends(smooth, width)
+    return excitation.ramp_ends(smooth, width)
 
 
 @lru_cache(64)
@@ -239,10 +234,10 @@ def _flat_multisine(n: int, rate: float, low: float, top: float, tilt: float) ->
 
 
 def _chirp(shape: Shape, n: int, rate: float) -> FloatArray:
-    settings = ExcitationSettings(
+    settings = excitation.ExcitationSettings(
         rate=rate, duration=n / rate, amplitude=1.0, noise=0.0, low=shape.low, high=_top(shape, rate)
     )
-    return chirp(settings)[:n]
+    return excitation.chirp(settings)[:n]
 
 
 def _levels(levels: FloatArray, shape: Shape, n: int, rate: float) -> FloatArray:
@@ -251,7 +246,7 @@ def _levels(levels: FloatArray, shape: Shape, n: int, rate: float) -> FloatArray
 
 
 def _top(shape: Shape, rate: float) -> float:
-    return min(shape.high, NYQUIST_SHARE * rate / 2.0)
+    return min(shape.high, excitation.NYQUIST_SHARE * rate / 2.0)
 
 
 KINDS: Mapping[Kind, Callable[[Shape, int, float], FloatArray]] = {
