@@ -192,7 +192,7 @@ def read_columns(path: Path, columns: Sequence[str], **options: Any) -> Table:
 
 
 _AS_NPZ = "write its columns to NPZ with numpy.savez (docs/import.md)"
-_KINDS: tuple[tuple[bytes, str, str], ...] = (
+_KINDS: tuple[tuple[bytes | tuple[bytes, ...], str, str], ...] = (
     (HDF5, "an HDF5 file", _AS_NPZ),
     (b"PK\x03\x04", "a spreadsheet or another zip archive", "save the sheet as CSV, or unpack it"),
     (b"\xd0\xcf\x11\xe0", "an Excel workbook", "save the sheet as CSV"),
@@ -203,11 +203,8 @@ _KINDS: tuple[tuple[bytes, str, str], ...] = (
     (b"SQLite format 3", "a database", "a bag (.db3) needs no import; export a table as CSV"),
     (b"\x93NUMPY", "an NPY file", "call it .npy"),
     (b"MATLAB 5.0", "a MAT file", "call it .mat"),
-    (b"\x80\x04", "a pickle, which may run any program", _AS_NPZ),
-    (b"\x80\x05", "a pickle, which may run any program", _AS_NPZ),
-    (b"\x80\x02", "a pickle, which may run any program", _AS_NPZ),
-    (b"CDF\x01", "a netCDF file", _AS_NPZ),
-    (b"CDF\x02", "a netCDF file", _AS_NPZ),
+    ((b"\x80\x02", b"\x80\x04", b"\x80\x05"), "a pickle, which may run any program", _AS_NPZ),
+    ((b"CDF\x01", b"CDF\x02"), "a netCDF file", _AS_NPZ),
 )
 """First bytes, kind, and what a person can do."""
 _TAR, _TAR_AT = b"ustar", 257

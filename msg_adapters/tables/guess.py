@@ -15,10 +15,9 @@ from pathlib import Path
 import numpy as np
 from scipy.signal import detrend
 
-from msg_adapters.tables import layout
 from msg_adapters.tables.column_table import CHANNELS, FACTORS, LINEAR, Table, Wanted, canonical, unit
 from msg_adapters.tables.raw_codes import raw_code
-from msg_adapters.tables.text_file import column_names, read_text
+from msg_adapters.tables.text_file import column_names, read_text, seconds_of
 from rsea_ros.errors import ImportMapError
 from rsea_ros.records.record import FloatArray
 
@@ -58,7 +57,7 @@ def guess_map(path: str | Path) -> str:
         tables = {decimal: read_text(path, replace(wanted, decimal=decimal)) for decimal in (".", ",")}
         decimal, table = max(tables.items(), key=lambda item: len(item[1].columns))
         first = {name: str(labels[0]) for name, labels in table.labels.items()}
-        dated = frozenset(name for name, text in first.items() if layout.seconds_of(text) is not None)
+        dated = frozenset(name for name, text in first.items() if seconds_of(text) is not None)
         units = {f"{n}[0]" if first.get(n, "").startswith("[") else n: text for n, text in units.items()}
         labels = frozenset(first.keys() & units.keys()) - dated
         kept = replace(wanted, columns=tuple(units), labels=labels, stamps=dated, decimal=decimal)

@@ -26,8 +26,8 @@ from pathlib import Path
 from msg_adapters.tables import map_terms
 from msg_adapters.tables.child import choose_element, is_open
 from msg_adapters.tables.column_table import CHANNELS, LINEAR, unit
-from msg_adapters.tables.layout import DELIMITERS
 from msg_adapters.tables.map_terms import CHANNEL, MAP, RATES, RUNS, SET_POINTS, TIME, WHERE
+from msg_adapters.tables.text_file import DELIMITERS
 from rsea_ros.documents import strict_yaml
 from rsea_ros.documents.wording import list_names, quote
 from rsea_ros.errors import FieldError, ImportMapError

@@ -16,7 +16,7 @@ import numpy as np
 
 from msg_adapters.tables.child import ElementAddress, finite_table, place_of
 from msg_adapters.tables.column_table import Table, Wanted, check_size, checked_lengths, index_of
-from msg_adapters.tables.layout import seconds_of
+from msg_adapters.tables.text_file import seconds_of
 from rsea_ros.documents.wording import brief, no_utf_8, quote
 
 LARGEST_FILE = 200_000_000

@@ -155,11 +155,9 @@ class DesignRequest:
             raise ParameterError(
                 f"longest run {self.longest:g} s, expected at least the shortest of {self.shortest:g} s"
             )
-        if self.longest * self.rate < max(run_shape.FEWEST.values()):
-            raise ParameterError(
-                f"longest run {self.longest:g} s at {self.rate:g} Hz, "
-                f"expected at least {max(run_shape.FEWEST.values())} samples"
-            )
+        if self.longest * self.rate < (fewest := max(run_shape.FEWEST.values())):
+            run = f"longest run {self.longest:g} s at {self.rate:g} Hz"
+            raise ParameterError(f"{run}, expected at least {fewest} samples")
 
 
 @dataclass(frozen=True)

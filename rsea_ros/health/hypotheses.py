@@ -148,13 +148,13 @@ class ChangeHypothesis:
 
 def hypotheses_of(rig: Rig, period: float) -> tuple[ChangeHypothesis, ...]:
     """Return the possible changes of a joint. period: s, between measurements."""
-    hypotheses = [_field(rig, "rotor.reflected_damping", "RSEA_FRICTION", 0.25)]
-    hypotheses.append(_effect(rig, "coulomb_friction", "torque", "RSEA_FRICTION", 0.25, 0.5, 0.5))
-    hypotheses.append(_friction(rig))
     delay = _effect(rig, "command_delay", "delay", "RSEA_DELAY", 0.25, 0.5 * period, period)
-    hypotheses.append(replace(delay, grain=period))
     gain = _effect(rig, "torque_constant_error", "gain", "RSEA_TORQUE_CONSTANT", 0.0, 0.05, 0.05)
-    hypotheses.append(replace(gain, doubt=GAIN_DOUBT))
+    hypotheses = [
+        _field(rig, "rotor.reflected_damping", "RSEA_FRICTION", 0.25),
+        _effect(rig, "coulomb_friction", "torque", "RSEA_FRICTION", 0.25, 0.5, 0.5),
+        _friction(rig), replace(delay, grain=period), replace(gain, doubt=GAIN_DOUBT),
+    ]  # fmt: skip
     if not rig.rigid_spring:
         hypotheses.append(_field(rig, "spring.stiffness", "RSEA_STIFFNESS", 0.05))
         if rig.ft_end == "spring_end":
