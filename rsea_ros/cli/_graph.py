@@ -22,7 +22,6 @@ class NodeCall:
 
     @property
     def arguments(self) -> list[str]:
-        """Return the ROS arguments of the process."""
         given = [word for name, value in self.parameters.items() for word in ("-p", f"{name}:={value}")]
         namespace = f"__ns:=/{self.namespace.strip('/')}"
         return ["--ros-args", "-r", namespace, "--params-file", str(self.file), *given]

@@ -33,7 +33,6 @@ FOUND = 1
 
 
 def add_force(parser: argparse.ArgumentParser) -> None:
-    """Declare --force."""
     parser.add_argument("--force", action="store_true", help="replace existing files (never an input)")
 
 
@@ -56,7 +55,6 @@ def add_json(parser: argparse.ArgumentParser, file: str) -> None:
 
 
 def print_file(path: Path) -> None:
-    """Print a file as it is."""
     print(path.read_text(encoding="utf-8"), end="")
 
 

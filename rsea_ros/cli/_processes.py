@@ -57,11 +57,9 @@ class Processes:
             self.stop(*self._running)
 
     def log(self, node: str) -> Path:
-        """Return the log file of the last start of a node."""
         return self._log_of.get(node, self._logs / f"{node}.log")
 
     def pid(self, node: str) -> int:
-        """Return the process ID of a node."""
         return self._running[node].pid
 
     def start(self, node: str, parameters: Mapping[str, object]) -> None:

@@ -112,7 +112,6 @@ class EscapedStream:
         self._colours = stream.isatty()
 
     def write(self, text: str) -> int:
-        """Write text."""
         self._stream.write(printable(text, colours=self._colours))
         return len(text)
 
@@ -152,7 +151,6 @@ def open_closed_streams() -> list[str]:
 
 
 def _instead(error: UnicodeError) -> tuple[str, int]:
-    """Return the replacement for characters that an encoding lacks."""
     if not isinstance(error, UnicodeEncodeError):
         raise error
     part = error.object[error.start : error.end]

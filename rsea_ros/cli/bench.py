@@ -33,7 +33,6 @@ PLANT_RATE = 10_000.0
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the verb's arguments."""
     add = parser.add_argument
     add("--port", type=path, default=Path("rsea-bench-tty"), help="name of the link to the pseudo-terminal")
     add("--model", type=int, nargs="+", default=[54024], choices=sorted(MODELS), metavar="NUMBER",

@@ -37,12 +37,10 @@ HEAD = (
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the actions."""
     add_actions(parser, ACTIONS)
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the action."""
     return ACTIONS[args.action].run(args)
 
 
@@ -58,7 +56,6 @@ def _add_make(parser: argparse.ArgumentParser) -> None:
 
 
 def _make(args: argparse.Namespace) -> int:
-    """Write the data set and the truth, and print both paths."""
     from rsea_ros.benchmark.dataset import read_text
 
     if not GENERATOR.is_file():
@@ -86,7 +83,6 @@ def _add_run(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(args: argparse.Namespace) -> int:
-    """Answer every record, and print the path of the answers."""
     from rsea_ros.benchmark.dataset import read_dataset
 
     out = args.out or Path(f"{args.entry}.jsonl")
@@ -157,7 +153,6 @@ def _add_score(parser: argparse.ArgumentParser) -> None:
 
 
 def _score(args: argparse.Namespace) -> int:
-    """Print the scores, each with its 95 % interval over records."""
     from rsea_ros.benchmark.dataset import read_answers, read_dataset
     from rsea_ros.benchmark.scoring import BASELINES, read_truth, score
 

@@ -16,7 +16,6 @@ EXAMPLE = "rsea call driver configure activate"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the node and what it shall do."""
     add = parser.add_argument
     add("node", nargs="?", default="", help="node: driver or /rsea/driver; without it, all are listed")
     add("action", nargs="*", help="actions, in this order; without one, those that it offers are listed")
@@ -24,7 +23,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """List, or call."""
     need_ros()
     from rsea_ros.nodes._visitor import Caller, visit
 

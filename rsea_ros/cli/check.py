@@ -27,7 +27,6 @@ EXAMPLE = "rsea check run.mcap --rig my_bench.yaml"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the verb's arguments."""
     add_runs(parser)
     add = parser.add_argument
     add("--json", action="store_true", help="print the findings as JSON (docs/check.md) and nothing else")
@@ -39,7 +38,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Check and print."""
     from rsea_ros.model.rig_file import load_rig
 
     rig, topics = load_rig(args.rig), topic_map(args)

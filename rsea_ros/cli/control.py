@@ -24,7 +24,6 @@ SLOWEST, FASTEST = 50.0, 2000.0
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the verb's arguments."""
     add = parser.add_argument
     add("rig", nargs="?", default=RIG, help="rig or model.yaml (default %(default)s)")
     free = "rig whose ends are the lightest load (default: the rig; the paper's pendulum if it is clamped)"
@@ -37,7 +36,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Design the controller, run the trials, write the results."""
     from rsea_ros.control.study import study
     from rsea_ros.control.uncertainty import lightest
     from rsea_ros.model.rig_file import load_rig

@@ -47,7 +47,6 @@ START_UP = 60.0
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the verb's arguments."""
     add = parser.add_argument
     add("--full", action="store_true", help="use the paper's 160 s of excitation instead of 20 s")
     add("--experiment", action="store_true", help="find a hidden cause by runs designed one after another")
@@ -59,7 +58,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the loop, then print identified and true values and the path of the report."""
     need_ros()
     out = directory(args.out)
     domain = random.randint(1, 101) if args.domain is None else args.domain
@@ -142,7 +140,6 @@ def patience() -> Mapping[str, float]:
 
 
 def measure(nodes: Processes, bag: Path, duration: float, seed: int, first: str) -> None:
-    """Play the paper's excitation on the bench and record it."""
     with stage(f"{first}, excite, record: chirp and noise for {duration:g} s") as tell:
         nodes.start("record", {"out": bag})
         nodes.start("excite", {"duration": duration, "seed": seed, "subscribers": 2})
@@ -151,7 +148,6 @@ def measure(nodes: Processes, bag: Path, duration: float, seed: int, first: str)
 
 
 def evaluate(nodes: Processes, bag: Path, out: Path, duration: float) -> None:
-    """Replay the bag to the identification."""
     with stage(f"replay, identify: the bag at {PACE:g} times the speed") as tell:
         nodes.start("identify", {"rig": RIG, "out": out, "reliable": True})
         nodes.start("replay", {"bag": bag, "rate": PACE})
@@ -224,7 +220,6 @@ def show(out: Path, domain: int, args: argparse.Namespace) -> int:
 
 
 def hidden_cause_text(true_rig: Rig) -> str:
-    """Return the hidden cause in words."""
     cause = true_rig.effects[-1]
     main = effect_named(cause.name).main
     size = f"{main.name.replace('_', ' ')} {cause.parameters[main.name]:g} {words.unit(main.unit)}"

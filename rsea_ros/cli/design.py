@@ -48,7 +48,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Test the stiffness, find the stiffnesses that meet all demands, write the results."""
     from rsea_ros.design.motor_gear_units import unit_named
     from rsea_ros.design.spring_design import least_stiffness, robust_stiffness, spring_design
     from rsea_ros.report.design import design_json, design_report

@@ -23,7 +23,6 @@ _MUCH = 0.2
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the verb's arguments."""
     add = parser.add_argument
     _topics.add_runs(parser, "several runs of one bench")
     add("--holdout", metavar="BAG", help="a run for testing only (default: a quarter of the runs, in blocks)")
@@ -41,7 +40,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Diagnose and write the results."""
     from rsea_ros.model.rig_file import load_rig
 
     if (args.edited is None) != (args.without_cause is None):

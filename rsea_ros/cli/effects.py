@@ -7,14 +7,12 @@ EXAMPLE = "rsea effects backlash"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the verb's arguments."""
     parser.add_argument(
         "name", nargs="?", help="the effect to show in full (default: one line for each effect)"
     )
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print the catalogue, or one effect with the description in its file."""
     from rsea_ros import effects
     from rsea_ros.cli._terminal import say
     from rsea_ros.effects.catalogue import EffectPage, effect_named

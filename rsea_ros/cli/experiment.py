@@ -27,7 +27,6 @@ NO_RUN = "no_run"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the verb's arguments."""
     from rsea_ros.documents.units import plain
     from rsea_ros.experiment.run_shape import UNITS
 
@@ -49,7 +48,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Design the run and write it."""
     from rsea_ros.experiment.advice import advise
     from rsea_ros.experiment.proposal import DesignRequest
     from rsea_ros.experiment.run_shape import limits_from
@@ -117,7 +115,6 @@ def _possible(
 
 
 def write_advice(advice: Advice, place: Destination, args: argparse.Namespace) -> Path:
-    """Write run.csv, experiment.json and report.html; return the report's path."""
     from rsea_ros.experiment.run_shape import run_text
     from rsea_ros.report.experiment import advice_json, advice_page
 

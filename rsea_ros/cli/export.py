@@ -37,7 +37,6 @@ _NUMBERS = "times_noise rms signal noise unit"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the verb's arguments."""
     targets = parser.add_mutually_exclusive_group(required=True)
     for name, about in TARGETS.items():
         aliases = ["--rig"] if name == "mjcf" else []
@@ -59,7 +58,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Export, verify, write, and report."""
     from rsea_ros.cli.simulate import parse_effect
     from rsea_ros.model.rig_document import check_effects
     from rsea_ros.model.rig_file import load_rig

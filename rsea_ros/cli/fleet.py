@@ -40,17 +40,14 @@ _WIDEST = 60
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the actions."""
     add_actions(parser, ACTIONS)
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the action."""
     return ACTIONS[args.action].run(args)
 
 
 def _add_work(parser: argparse.ArgumentParser) -> None:
-    """Declare the options for sources, processing and workers."""
     add = parser.add_argument
     add("sources", nargs="+", metavar="SOURCE", help="folder, bag, pattern in quotes, URL, or @FILE: a list")
     add("--map", required=True, metavar="joints.yaml", help="joint map: rig and topics of each joint")
@@ -85,7 +82,6 @@ def _add_run(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(args: argparse.Namespace) -> int:
-    """Process new recordings, and print the outcomes."""
     _check_work(args)
     held = _recordings(args)
     sources = ", ".join(args.sources)
@@ -132,7 +128,6 @@ def _recordings(args: argparse.Namespace) -> list[task.Held]:
 
 
 def write_rows(args: argparse.Namespace, out: str, held: Sequence[task.Held]) -> RunSummary:
-    """Write the rows of all new recordings, and return the outcomes."""
     from rsea_ros.fleet.engine import Engine, EngineLimits
     from rsea_ros.fleet.store import hold_lock, open_store
 
@@ -187,7 +182,6 @@ def _add_report(parser: argparse.ArgumentParser) -> None:
 
 
 def _report(args: argparse.Namespace) -> int:
-    """Write the pages of a store and print their path."""
     from rsea_ros.fleet import history, recordings
     from rsea_ros.report.fleet.page import INDEX, write_fleet_report
 
@@ -249,7 +243,6 @@ def _look(args: argparse.Namespace, held: list[task.Held], at_first: bool) -> in
 
 
 def _add_sql(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments of `sql`."""
     parser.add_argument(
         "query", help="SELECT … FROM recordings, parameters, causes, faults or analyses (docs/fleet.md)"
     )
@@ -260,7 +253,6 @@ def _add_sql(parser: argparse.ArgumentParser) -> None:
 
 
 def _sql(args: argparse.Namespace) -> int:
-    """Print the answer."""
     from rsea_ros.fleet.query import answer
     from rsea_ros.fleet.store import open_store
 

@@ -16,7 +16,6 @@ EXAMPLE = "rsea identify run.mcap --rig my_bench.yaml --out results"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the verb's arguments."""
     _topics.add_runs(parser)
     _output.add_results(parser, ", ".join(IDENTIFICATION), "out/identify-BAG")
     _output.add_json(parser, IDENTIFICATION_JSON)
@@ -26,7 +25,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Identify and write the results."""
     from rsea_ros.model.rig_file import load_rig
 
     default = Path("out") / f"identify-{Path(args.bags[0]).stem}"

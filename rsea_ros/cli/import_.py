@@ -19,7 +19,6 @@ EXAMPLE = "rsea import run.csv --map map.yaml --out run"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the verb's arguments."""
     parser.add_argument(
         "files", nargs="+", metavar="FILE",
         help="measurements: .csv, .tsv or other text (also .gz), .mat (up to version 7), .parquet, .npz, "
@@ -44,7 +43,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Write the bags and print their contents, or a first map."""
     if args.guess:
         return _guess(args.files, Path(args.guess), args.force)
     if args.out is None:
@@ -64,7 +62,6 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _guess(files: list[str], path: Path, force: bool) -> int:
-    """Write a map for the one file, and say what comes next."""
     if len(files) > 1:
         raise ParameterError(f"--guess: {len(files)} files, expected one: its map may serve the others")
     check_free([path], force=force, inputs=files)

@@ -7,7 +7,6 @@ EXAMPLE = "rsea launch simulation rig:=paper_moving_output excite:=true record:=
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the verb's arguments."""
     from rsea_ros.cli._graph import arguments_of_graphs, graph_names
 
     parser.add_argument("graph", metavar="GRAPH", help=", ".join(graph_names()))

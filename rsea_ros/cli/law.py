@@ -14,7 +14,6 @@ FINDINGS = ("law", "no_law", "at_noise_floor")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the verb's arguments."""
     _topics.add_runs(parser, "several runs of one bench", "model.yaml of a diagnosis, or any rig")
     _output.add_results(parser, f"the effect file, {', '.join(LAW)}", "out/law-BAG")
     _output.add_json(parser, LAW_JSON)
@@ -23,7 +22,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Search for a law and write it."""
     from rsea_ros.model.rig_file import load_rig
 
     default = Path("out") / f"law-{Path(args.bags[0]).stem}"

@@ -174,11 +174,9 @@ class _Parser(argparse.ArgumentParser):
 
     @property
     def options(self) -> list[str]:
-        """All options of the parser, such as `--out`."""
         return [option for action in self._actions for option in action.option_strings]
 
     def error(self, message: str) -> NoReturn:
-        """Leave with status 2."""
         near = "" if "did you mean" in message else self._nearest(message)
         sys.exit(_fail(self.prog, f"{message}{near} (see {self.prog} --help)"))
 

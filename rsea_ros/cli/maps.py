@@ -19,7 +19,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print a line for each map."""
     from msg_adapters.tables import load_map
     from rsea_ros.cli._terminal import columns, say
 
@@ -30,7 +29,6 @@ def run(args: argparse.Namespace) -> int:
 
 
 def map_names() -> list[str]:
-    """Return the names of the maps that come with the package."""
     return sorted({path.stem for folder in _folders() for path in folder.glob("*.yaml")})
 
 

@@ -31,7 +31,6 @@ SHORTEST = 20.0
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the verb's arguments."""
     add_results(parser, f"{PAPER_JSON}, {REPORT} and the simulated bags", "out/paper")
     add = parser.add_argument
     about = "duration of each simulated test, s (default %(default)s)"
@@ -44,7 +43,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Simulate the tests, recompute the paper, write the results."""
     from rsea_ros.paper.page import paper_json, paper_report
 
     if args.figures:
@@ -89,7 +87,6 @@ def _figures(args: argparse.Namespace) -> int:
 
 
 def _tests(args: argparse.Namespace, new: NewFiles, tell: Callable[[str, float], None]) -> PaperTests:
-    """Simulate the paper's tests, each through a bag."""
     import numpy as np
 
     from msg_adapters import read_record, write_record

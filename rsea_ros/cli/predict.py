@@ -23,7 +23,6 @@ EXAMPLE = "rsea predict results/model.yaml other_run.mcap"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the verb's arguments."""
     parser.add_argument("model", help="model.yaml, or the name or file of any rig")
     parser.add_argument("bag", help="rosbag2 directory, .mcap or .db3")
     about = "file for the predicted channels: t in s, then one column per channel in SI units"
@@ -41,12 +40,10 @@ class _RigComesFirst(argparse.Action):
         self, parser: argparse.ArgumentParser, namespace: argparse.Namespace, values: object,
         option_string: str | None = None,
     ) -> NoReturn:  # fmt: skip
-        """Leave with status 2."""
         parser.error(f"no --rig here: a model or a rig is the first argument, `{parser.prog} {values} BAG`")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Predict, print the errors, write the CSV."""
     if args.out:
         check_free([Path(args.out)], force=args.force, inputs=[args.bag, args.model])
     record = read_record([args.bag], topics=topic_map(args), strict=False)

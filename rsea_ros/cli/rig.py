@@ -14,7 +14,6 @@ EXAMPLE = "rsea rig new my_bench && rsea rig check my_bench.yaml"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare `new` and `check`."""
     actions = parser.add_subparsers(dest="action", required=True, metavar="new|check")
     new = actions.add_parser("new", help="write a rig to fill in, with every common key explained")
     new.add_argument("name", help="name of the rig; the file is NAME.yaml unless --out states another")
@@ -25,7 +24,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the action."""
     return _new(args) if args.action == "new" else _check(args)
 
 

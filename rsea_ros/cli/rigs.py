@@ -11,7 +11,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print a line for each rig."""
     from rsea_ros.cli._terminal import columns, say
     from rsea_ros.model.rig_file import load_rig, rig_names
 

@@ -48,7 +48,6 @@ def become(words: Sequence[str]) -> NoReturn:
 
 
 def node_names() -> list[str]:
-    """Return the names of all nodes."""
     return sorted(path.stem for path in _NODES.glob("[!_]*.py"))
 
 

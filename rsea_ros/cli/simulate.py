@@ -41,7 +41,6 @@ _OPTIONS = (
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the verb's arguments."""
     add, default = parser.add_argument, ExcitationSettings()
     add("rig", help="rig or model.yaml, or the name of one in config/rigs")
     add("--out", required=True, help="bag to write: a directory, or a file .mcap or .db3")
@@ -65,7 +64,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Simulate and write the bag."""
     check_free([Path(args.out)], force=args.force, inputs=[args.rig])
     rig = load_rig(args.rig)
     rig = rig.with_effects(*rig.effects, *(parse_effect(text) for text in args.effect))

@@ -10,7 +10,6 @@ EXAMPLE = "rsea topics rate /rsea/ft"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare list, rate and echo."""
     actions = parser.add_subparsers(dest="action", metavar="list|rate|echo")
     listing = actions.add_parser("list", help="list every topic with type and publishers (the default)")
     rate = actions.add_parser("rate", help="print the rate of a topic, and the longest gap")
@@ -27,7 +26,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Listen, and print."""
     need_ros()
     from rsea_ros.nodes._visitor import Listener, visit
 

@@ -15,7 +15,6 @@ EXAMPLE = "rsea watch --rig paper_high_impedance --host 0.0.0.0"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the verb's arguments."""
     add = parser.add_argument
     add("--rig", default=RIG, help="rig of the bench: a name in config/rigs, or a file")
     add("--host", default="localhost", help="address of the server; 0.0.0.0: also for the network (a phone)")

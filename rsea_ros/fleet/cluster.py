@@ -43,14 +43,12 @@ class OnDask:
 
     @property
     def places(self) -> int:
-        """How many jobs may be in flight at once."""
         if time.monotonic() - self._counted > COUNTED_EVERY:
             self._counted = time.monotonic()
             self._places = PER_WORKER * max(1, self._client.scheduler_info(n_workers=0)["n_workers"])
         return self._places
 
     def submit(self, job: Job) -> None:
-        """Send a job to the scheduler."""
         self._named += 1
         if self._named % NAMES == 0:
             key_split.cache_clear()

@@ -201,11 +201,9 @@ class RunSummary:
 
     @property
     def rows(self) -> int:
-        """How many rows were written."""
         return sum(self.outcomes.values())
 
     def sentence(self) -> str:
-        """Return all counts as one line."""
         parts = [f"{n} {outcome}" for outcome, n in sorted(self.outcomes.items())] or ["nothing new"]
         others = {
             "in the store before": self.before,
@@ -241,7 +239,6 @@ class Rate:
 
 
 def duration(minutes: float) -> str:
-    """Return a length of time as people say it."""
     if minutes < 1.5:
         return f"{60.0 * minutes:.0f} s"
     return f"{minutes:.0f} min" if minutes < 90.0 else f"{minutes / 60.0:.1f} h"

@@ -98,7 +98,6 @@ class MappedJoint:
     diagnose: Diagnose = "misfit"
 
     def is_in(self, path: str) -> bool:
-        """Return whether a recording holds this joint, by its path."""
         return not self.bags or any(fnmatchcase(path, p) or fnmatchcase(path, f"*/{p}") for p in self.bags)
 
     @property
@@ -165,7 +164,6 @@ def _rig(name: str, field: str, folder: Path) -> str:
 
 
 def _table(body: Mapping[str, Any], field: str, folder: Path) -> ImportMap | None:
-    """Return the import map of a joint whose recordings are tables."""
     if "import" not in body:
         return None
     name = text(body["import"], field)

@@ -70,11 +70,9 @@ class Serial:
         self._jobs: deque[Job] = deque()
 
     def submit(self, job: Job) -> None:
-        """Take a job."""
         self._jobs.append(job)
 
     def next(self, timeout: float | None) -> Done | None:
-        """Run the oldest job."""
         job = self._jobs.popleft()
         try:
             return Done(job, job.function(job.argument))
@@ -111,7 +109,6 @@ class Worker:
         return 0
 
     def end(self) -> None:
-        """End the process and free its pipe."""
         self.process.kill()
         self.process.join()
         self.pipe.close()
@@ -127,11 +124,9 @@ class Pool:
 
     @property
     def places(self) -> int:
-        """How many jobs may be in flight at once."""
         return PER_WORKER * len(self._workers)
 
     def submit(self, job: Job) -> None:
-        """Take a job."""
         self._ready.append(job)
         self._hand_out()
 
@@ -246,7 +241,6 @@ def frequent_collection() -> Iterator[None]:
 
 
 def cores() -> int:
-    """Return how many cores this process may use."""
     return len(os.sched_getaffinity(0))
 
 

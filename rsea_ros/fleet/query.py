@@ -118,7 +118,6 @@ def _answer(store: Store, query: str) -> tuple[list[str], list[tuple[Any, ...]]]
 
 
 def _quote(path: str) -> str:
-    """Return a path escaped for SQL."""
     return path.replace("'", "''")
 
 

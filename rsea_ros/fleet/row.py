@@ -99,7 +99,6 @@ def write(rows: Sequence[Mapping[str, Any]], path: Path) -> None:
 
 
 def write_table(table: pa.Table, path: Path) -> None:
-    """Write a table of this schema. Raises OSError."""
     parquet.write_table(table, path, compression="zstd")
 
 
@@ -174,7 +173,6 @@ def finish(folder: Path) -> None:
 
 
 def _replace(folder: Path, files: Sequence[Path], table: pa.Table) -> None:
-    """Give a table the place of some files."""
     names = [file.name for file in files]
     digest = hashlib.sha256("\n".join(names).encode()).hexdigest()[:16]
     marked = table.replace_schema_metadata({**(table.schema.metadata or {}), _REPLACES: json.dumps(names)})

@@ -105,7 +105,6 @@ def _each(sources: Iterable[str]) -> Iterator[str]:
 
 
 def _file_system(url: str) -> tuple[Any, str]:
-    """Return the file system of a path or URL and the path in it."""
     try:
         files, inner = url_to_fs(url)
     except (ValueError, ImportError) as error:

@@ -47,7 +47,6 @@ class Store:
 
     @property
     def rows(self) -> Path:
-        """The folder of the Parquet files."""
         return self.path / "rows"
 
     def known_rows(self) -> tuple[set[str], dict[tuple[str, int, str], str]]:
@@ -96,7 +95,6 @@ class Store:
             of_row.take_out(file, outcomes)
 
     def compact(self) -> None:
-        """Make one file of each partition's rows."""
         for folder in sorted(self.rows.glob("joint=*/month=*")):
             of_row.compact(folder)
 

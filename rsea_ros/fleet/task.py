@@ -95,7 +95,6 @@ class Task:
 
     @property
     def key(self) -> str:
-        """The unique key of the row."""
         return key_of(self.joint.name, self.recording, self.model_version, self.joint.settings)
 
     def row(self, **stated: object) -> Row:
@@ -152,7 +151,6 @@ def work(task: Task) -> TaskOutcome:
 
 
 def reason(text: str) -> str:
-    """Return the text of an error as one line of a row."""
     return brief(" ".join(text.split()), _LONGEST)
 
 
@@ -163,7 +161,6 @@ def _now(bag: Bag) -> Bag | None:
 
 
 def _fault(error: Exception) -> str:
-    """Return one line about an error that nobody expected."""
     place = traceback.extract_tb(error.__traceback__)[-1]
     kind = type(error).__name__
     return f"a bug in rsea, please report it: {kind} in {Path(place.filename).name}:{place.lineno}: {error}"

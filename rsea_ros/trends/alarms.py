@@ -147,6 +147,5 @@ def by_joint(alarms: Iterable[Alarm]) -> dict[str, list[Alarm]]:
 
 
 def worst_first(joints: Sequence[str], alarms: Iterable[Alarm]) -> list[str]:
-    """Return all joints, those with alarms first."""
     alarmed = by_joint(alarms)
     return [*alarmed, *(j for j in joints if j not in alarmed)]

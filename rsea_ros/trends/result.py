@@ -181,12 +181,10 @@ class Steps:
 
     @property
     def days(self) -> float:
-        """Return how long a step is."""
         return float(self.edges[1] - self.edges[0]) / DAY
 
     @property
     def name(self) -> str:
-        """Return the name of a step."""
         weeks = round(self.days / _WEEK)
         return "day" if self.days < _WEEK else "week" if weeks == 1 else f"{weeks} weeks"
 
@@ -199,7 +197,6 @@ class Steps:
         return len(self.edges) - 1
 
     def place(self, time_s: FloatArray) -> np.ndarray:
-        """Return the step that each time lies in."""
         places = np.searchsorted(self.edges, time_s, side="right") - 1
         return np.clip(places, 0, len(self) - 1)
 

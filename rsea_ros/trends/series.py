@@ -105,7 +105,6 @@ class Series:
     artefacts: npt.NDArray[Any]
 
     def keep(self, rows: BoolArray) -> Series:
-        """Return the series of some of its rows."""
         arrays = ("time_s", "value", "sd", "identifiable", "temperature", "recording", "artefacts")
         return Series(self.joint, self.parameter, self.unit, **{n: getattr(self, n)[rows] for n in arrays})
 

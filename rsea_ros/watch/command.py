@@ -99,7 +99,6 @@ class Commander:
             return True
 
     def release(self, who: object) -> None:
-        """Release the command if the page has it."""
         with self._lock:
             if self.holder == who:
                 self._let_go()
@@ -126,7 +125,6 @@ class Commander:
         self.holder, self._fall = None, abs(self._envelope) / RELEASE
 
     def _move(self, step: float, now: float) -> None:
-        """Move the envelope towards the request, or to zero."""
         if self.holder is None or self.bounds is None:
             aim, most = 0.0, self._fall * step
         else:

@@ -42,23 +42,19 @@ class Desk:
 
     @property
     def count(self) -> int:
-        """How many pages are open."""
         return len(self._pages)
 
     def enter(self, page: Page) -> bool:
-        """Register a page; return whether there is room for it."""
         if len(self._pages) >= MOST_PAGES:
             return False
         self._pages.add(page)
         return True
 
     def leave(self, page: Page) -> None:
-        """Forget a page and release its command."""
         self._release(page)
         self._pages.discard(page)
 
     def leave_all(self) -> None:
-        """Forget all pages."""
         for page in list(self._pages):
             self.leave(page)
 
@@ -83,7 +79,6 @@ class Desk:
         return json.dumps({"state": {**more, "command": command, "recordings": self._runs.look()}})
 
     def send(self, *texts: str | None) -> None:
-        """Send texts to every page that keeps up."""
         for page in list(self._pages):
             for text in texts:
                 if text is not None and page.waiting < MOST_WAITING:

@@ -76,7 +76,6 @@ KINDS = {"watch.css": "text/css", "watch.js": "text/javascript", "plot.js": "tex
 
 
 def routes(access: Access, desk: Desk, runs: Runs) -> Sequence[Any]:
-    """Return the routes of the Application."""
     return [
         (r"/", Front, {"access": access}),
         (r"/(watch\.css|watch\.js|plot\.js)", PageFileHandler, {"access": access}),
@@ -91,7 +90,6 @@ class TokenHandler(RequestHandler):
     access: Access
 
     def initialize(self, **given: Any) -> None:
-        """Keep the arguments from routes()."""
         vars(self).update(given)
 
     def prepare(self) -> None:
@@ -100,13 +98,11 @@ class TokenHandler(RequestHandler):
             raise HTTPError(403)
 
     def set_default_headers(self) -> None:
-        """Let nobody keep, frame or sniff it."""
         self.clear_header("Server")
         for name, value in {**HEADERS, "Content-Security-Policy": PAGE_POLICY}.items():
             self.set_header(name, value)
 
     def write_error(self, status_code: int, **more: Any) -> None:
-        """Say it in a line."""
         message = "open the address that rsea watch printed: it has the token"
         self.finish(f"{status_code}: {message if status_code == 403 else self._reason}\n")
 
@@ -118,7 +114,6 @@ class Front(TokenHandler):
     """
 
     def prepare(self) -> None:
-        """Take a token in the address for a cookie."""
         given = self.get_query_argument("token", None)
         if given is None:
             super().prepare()
@@ -128,7 +123,6 @@ class Front(TokenHandler):
             raise HTTPError(403)
 
     def get(self) -> None:
-        """Send the page."""
         self.finish((PARTS / "index.html").read_bytes())
 
 
@@ -136,7 +130,6 @@ class PageFileHandler(TokenHandler):
     """Style and scripts of the page."""
 
     def get(self, name: str) -> None:
-        """Send a part."""
         self.set_header("Content-Type", f"{KINDS[name]}; charset=utf-8")
         self.finish((PARTS / name).read_bytes())
 
@@ -147,7 +140,6 @@ class ReportHandler(TokenHandler):
     runs: Runs
 
     def get(self, recording: str, verb: str) -> None:
-        """Send it."""
         page = self.runs.report(recording, verb)
         if page is None:
             raise HTTPError(404)
@@ -162,21 +154,17 @@ class Socket(TokenHandler, WebSocketHandler):
     waiting = 0
 
     def check_origin(self, origin: str) -> bool:
-        """Let in only the page itself."""
         return same_origin(origin, self.request.host)
 
     def open(self, *args: str, **more: str) -> None:
-        """Enter."""
         self.set_nodelay(True)
         if not self.desk.enter(self):
             self.close(1013, "too many pages are open")
 
     def on_message(self, message: str | bytes) -> None:
-        """Execute the page's request."""
         self.desk.act(self, message)
 
     def on_close(self) -> None:
-        """Leave."""
         self.desk.leave(self)
 
     def send(self, text: str) -> None:

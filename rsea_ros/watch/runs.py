@@ -95,7 +95,6 @@ class Runs:
         each.jobs[verb] = Evaluation(folder, *_python(words))
 
     def report(self, name: str, verb: str) -> Path | None:
-        """Return the report of a recording, or None."""
         job = self._recordings[name].jobs.get(verb) if name in self._recordings else None
         return job.folder / REPORT if job is not None and job.state == "done" else None
 

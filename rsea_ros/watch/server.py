@@ -111,7 +111,6 @@ class Server:
         self.thread = threading.Thread(target=self._run, daemon=True)
 
     def start(self) -> None:
-        """Begin to serve."""
         self.thread.start()
         self._ready.wait()
 
@@ -152,7 +151,6 @@ class Server:
         await http.close_all_connections()
 
     def _tick(self) -> None:
-        """Send new samples to the open pages."""
         if not self.desk.count:
             return
         state, now = None, time.monotonic()
