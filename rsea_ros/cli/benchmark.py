@@ -4,8 +4,6 @@
 project, `score` holds answers against the truth, beside answers that need no skill.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import math
@@ -15,16 +13,16 @@ from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
 from shlex import quote
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from rsea_ros.benchmark import scoring
+from rsea_ros.benchmark.dataset import Answer, Dataset, read_answers, read_dataset, read_text
 from rsea_ros.cli._output import Action, add_actions, add_force, path
 from rsea_ros.cli._terminal import columns, positive, progress, say, whole_number
 from rsea_ros.errors import BenchmarkError, ParameterError, RseaError
+from rsea_ros.model.rig_file import load_rig
 from rsea_ros.outputs.new_files import check_free, write_file
-
-if TYPE_CHECKING:
-    from rsea_ros.benchmark import dataset, scoring
-    from rsea_ros.progress import Progress
+from rsea_ros.progress import Progress
 
 HELP = "name hidden causes: make records of known truth, answer them, score answers (make, run, score)"
 EXAMPLE = "rsea benchmark make records --seed 1 && rsea benchmark run records --out answers.jsonl"
@@ -56,8 +54,6 @@ def _add_make(parser: argparse.ArgumentParser) -> None:
 
 
 def _make(args: argparse.Namespace) -> int:
-    from rsea_ros.benchmark.dataset import read_text
-
     if not GENERATOR.is_file():
         raise BenchmarkError("make needs a clone of the repository: its plant is no part of the package")
     if not 1 <= args.records <= MOST:
@@ -83,8 +79,6 @@ def _add_run(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(args: argparse.Namespace) -> int:
-    from rsea_ros.benchmark.dataset import read_dataset
-
     out = args.out or Path(f"{args.entry}.jsonl")
     check_free([out], force=args.force)
     records = read_dataset(args.dataset)
@@ -101,7 +95,7 @@ def _run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _lines(records: dataset.Dataset, entry: str, partial: Path, tell: Progress) -> Iterator[dict[str, Any]]:
+def _lines(records: Dataset, entry: str, partial: Path, tell: Progress) -> Iterator[dict[str, Any]]:
     """Yield the answer to each record for JSON.
 
     partial: keeps the answers as they come; a run that was stopped goes on from there.
@@ -116,7 +110,7 @@ def _lines(records: dataset.Dataset, entry: str, partial: Path, tell: Progress) 
         yield known[name]
 
 
-def _kept_answers(records: dataset.Dataset, entry: str, partial: Path) -> dict[str, dict[str, Any]]:
+def _kept_answers(records: Dataset, entry: str, partial: Path) -> dict[str, dict[str, Any]]:
     """Return the answers of a stopped run of this entry to these very records, by record."""
     kept = {}
     for text in partial.read_text(encoding="utf-8").splitlines() if partial.exists() else ():
@@ -129,16 +123,12 @@ def _kept_answers(records: dataset.Dataset, entry: str, partial: Path) -> dict[s
     return kept
 
 
-def _answer(records: dataset.Dataset, entry: str, name: str) -> dict[str, Any]:
+def _answer(records: Dataset, entry: str, name: str) -> dict[str, Any]:
     """Return the answer to a record; one that cannot be diagnosed names no effect."""
-    from rsea_ros.benchmark.dataset import Answer
-    from rsea_ros.benchmark.scoring import ENTRIES
-    from rsea_ros.model.rig_file import load_rig
-
     record, rig = records.record(name), load_rig(records.rig_path(name))
     start, failure = time.monotonic(), {}
     try:
-        answer = ENTRIES[entry](record, rig)
+        answer = scoring.ENTRIES[entry](record, rig)
     except RseaError as error:
         answer, failure = Answer(), {"error": str(error)}
     seconds = round(time.monotonic() - start, 2)
@@ -153,18 +143,15 @@ def _add_score(parser: argparse.ArgumentParser) -> None:
 
 
 def _score(args: argparse.Namespace) -> int:
-    from rsea_ros.benchmark.dataset import read_answers, read_dataset
-    from rsea_ros.benchmark.scoring import BASELINES, read_truth, score
-
     records = read_dataset(args.dataset)
-    truths = read_truth(args.truth or records.truth, records)
-    entries = {name: make(records) for name, make in BASELINES.items()}
+    truths = scoring.read_truth(args.truth or records.truth, records)
+    entries = {name: make(records) for name, make in scoring.BASELINES.items()}
     for file in args.answers:
         name = file.name.removesuffix(".jsonl")
         if name in entries:
             raise ParameterError(f"{file}: a second row {name!r}, expected another file name")
         entries[name] = read_answers(file, records)
-    scores = {name: score(answers, truths, records.effects) for name, answers in entries.items()}
+    scores = {name: scoring.score(answers, truths, records.effects) for name, answers in entries.items()}
     if args.json:
         print(json.dumps({"records": len(truths), "entries": {n: _document(s) for n, s in scores.items()}}))
     else:

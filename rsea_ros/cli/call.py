@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from rsea_ros.cli._graph import need_ros
+from rsea_ros.cli._processes import need_ros
 from rsea_ros.cli._terminal import columns, positive
 
 if TYPE_CHECKING:

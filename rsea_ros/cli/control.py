@@ -1,21 +1,23 @@
 """`rsea control`: gains of the torque controller for a rig, their margins, and the resulting performance."""
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+from rich.console import Console
+from rich.table import Table
 
 from rsea_ros.cli._output import add_json, add_results, print_file, provenance, results_place
 from rsea_ros.cli._terminal import progress
 from rsea_ros.cli._topics import RIG
+from rsea_ros.control.study import MotorLimits, Study, study
+from rsea_ros.control.uncertainty import lightest
+from rsea_ros.design.motor_gear_units import catalogue
 from rsea_ros.errors import ParameterError
+from rsea_ros.model.rig import Rig, motor_torque
+from rsea_ros.model.rig_file import load_rig
 from rsea_ros.outputs.new_files import NewFiles
+from rsea_ros.report import control as page
 from rsea_ros.report.result_files import CONTROL_JSON, REPORT, json_text
-
-if TYPE_CHECKING:
-    from rsea_ros.control.study import MotorLimits, Study
-    from rsea_ros.model.rig import Rig
 
 HELP = "design the torque controller of a rig: gains, margins, trials in simulation, output impedance"
 EXAMPLE = "rsea control paper_high_impedance --rate 280"
@@ -36,11 +38,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    from rsea_ros.control.study import study
-    from rsea_ros.control.uncertainty import lightest
-    from rsea_ros.model.rig_file import load_rig
-    from rsea_ros.report.control import control_json, control_report
-
     place = results_place(args, "out/control", (CONTROL_JSON, REPORT), [args.rig, args.free])
     for rate in args.rate:
         if not SLOWEST <= rate <= FASTEST:
@@ -50,8 +47,8 @@ def run(args: argparse.Namespace) -> int:
         result = study(rig, lightest(rig, args.free or ""), args.rate, motors(rig), progress=report_progress)
     source = provenance("control", [], args.rig)
     with NewFiles(place) as new:
-        path = new.write(CONTROL_JSON, json_text(control_json(result)))
-        report = new.write(REPORT, control_report(result, source))
+        path = new.write(CONTROL_JSON, json_text(page.control_json(result)))
+        report = new.write(REPORT, page.control_report(result, source))
     if args.json:
         print_file(path)
     else:
@@ -62,10 +59,6 @@ def run(args: argparse.Namespace) -> int:
 
 def motors(rig: Rig) -> list[MotorLimits]:
     """Return the limit of the driver, and those of the catalogue unit with the gear ratio of the rig."""
-    from rsea_ros.control.study import MotorLimits
-    from rsea_ros.design.motor_gear_units import catalogue
-    from rsea_ros.model.rig import motor_torque
-
     limit, where = motor_torque(rig)
     limits = [MotorLimits("driver's limit", limit, float("inf"), where)]
     for unit in catalogue().values():
@@ -79,19 +72,14 @@ def motors(rig: Rig) -> list[MotorLimits]:
 
 
 def _print(result: Study, report: Path) -> None:
-    from rich.console import Console
-    from rich.table import Table
-
-    from rsea_ros.report import control as tables
-
     console = Console()
-    for line in tables.gains_words(result):
+    for line in page.gains_words(result):
         console.print(line, highlight=False)
-    rates = tables.rates(result)
+    rates = page.rates(result)
     blocks = [
-        (["trial", "required", *rates], tables.trial_rows(result)),
-        (["compensated", "sine", *rates], tables.compensation_rows(result)),
-        (tables.REACH_HEAD, tables.reach_rows(result)),
+        (["trial", "required", *rates], page.trial_rows(result)),
+        (["compensated", "sine", *rates], page.compensation_rows(result)),
+        (page.REACH_HEAD, page.reach_rows(result)),
     ]
     for head, rows in blocks:
         shown = Table(*head, box=None, pad_edge=False, header_style="dim")

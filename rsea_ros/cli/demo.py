@@ -8,15 +8,14 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 
 from msg_adapters import read_record
 from msg_adapters.bags import read_contents
-from rsea_ros.cli._graph import need_ros, parameters_of_bench
 from rsea_ros.cli._output import path
-from rsea_ros.cli._processes import Processes
+from rsea_ros.cli._processes import Processes, need_ros, parameters_of_bench
 from rsea_ros.cli._terminal import columns, progress, say, whole_number
 from rsea_ros.cli._topics import RIG
 from rsea_ros.documents import strict_yaml
@@ -94,7 +93,9 @@ def record_bench(nodes: Processes, out: Path, duration: float, args: argparse.Na
         (out / "bag-2", "again; the results come from a disturbed run"),
     ):
         with source(nodes, out, args) as name:
-            measure(nodes, bag, duration, args.seed, name)
+            title = f"{name}, excite, record: chirp and noise for {duration:g} s"
+            measure(nodes, bag, title, {"duration": duration, "seed": args.seed})
+            nodes.stop(name)
         disturbances = [f for f in read_record(bag, strict=False).faults if f.kind in DISTURBANCES]
         if not disturbances:
             break
@@ -139,12 +140,13 @@ def patience() -> Mapping[str, float]:
     return cast(Mapping[str, float], content["/**"]["ros__parameters"])
 
 
-def measure(nodes: Processes, bag: Path, duration: float, seed: int, first: str) -> None:
-    with stage(f"{first}, excite, record: chirp and noise for {duration:g} s") as tell:
+def measure(nodes: Processes, bag: Path, title: str, command: Mapping[str, Any]) -> None:
+    """Play a command and record it. command: parameters of the node excite."""
+    with stage(title) as tell:
         nodes.start("record", {"out": bag})
-        nodes.start("excite", {"duration": duration, "seed": seed, "subscribers": 2})
-        nodes.wait("excite", duration + START_UP, tell)
-        nodes.stop("record", first)
+        nodes.start("excite", {**command, "subscribers": 2})
+        nodes.wait("excite", command["duration"] + START_UP, tell)
+        nodes.stop("record")
 
 
 def evaluate(nodes: Processes, bag: Path, out: Path, duration: float) -> None:
@@ -169,7 +171,7 @@ def table(start: Rig, true: Rig, identified: Rig) -> str:
 
 
 def losses(bag: Path, identify_log: Path) -> str:
-    """Print how many messages of the bag reached the identification."""
+    """Return how many messages of the bag reached the identification."""
     wanted = ("torque_command", "joint_states", "ft")
     topics = read_contents(bag).topics
     sent = sum(len(topics[f"/rsea/{name}"].raw) for name in wanted)
@@ -201,11 +203,8 @@ def show(out: Path, domain: int, args: argparse.Namespace) -> int:
     print(f"{RIG}, with values up to {100.0 * SPREAD:g} % off and a cause known to the plant only")
     with Processes(out / "log", domain) as nodes:
         with source(nodes, out, args) as first:
-            with stage(f"{first}, excite, record: 10 s of slow work at {SLOW['amplitude']:g} N·m") as tell:
-                nodes.start("record", {"out": out / "bag"})
-                nodes.start("excite", {**SLOW, "subscribers": 2})
-                nodes.wait("excite", 10.0 + START_UP, tell)
-                nodes.stop("record")
+            title = f"{first}, excite, record: 10 s of slow work at {SLOW['amplitude']:g} N·m"
+            measure(nodes, out / "bag", title, SLOW)
             with stage(f"experiment: runs within {LIMITS}, without asking") as tell:
                 values = {"bag": out / "bag", "out": out, "limits": LIMITS, "ask": False, "rig": RIG}
                 nodes.start("experiment", values)

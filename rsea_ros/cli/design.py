@@ -8,9 +8,12 @@ from typing import Any
 from rsea_ros.cli import _output
 from rsea_ros.cli._output import path
 from rsea_ros.cli._terminal import say
-from rsea_ros.design.mechanism import Requirement
+from rsea_ros.design import spring_design as springs
+from rsea_ros.design.mechanism import UNITS, Requirement
+from rsea_ros.design.motor_gear_units import unit_named
 from rsea_ros.model.train import TRAINS
 from rsea_ros.outputs.new_files import NewFiles
+from rsea_ros.report import design as page, words
 from rsea_ros.report.result_files import DESIGN_JSON, REPORT, json_text
 
 HELP = "compute spring stiffness and spring rate from torque, bandwidth and inertia by the paper's method"
@@ -48,25 +51,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    from rsea_ros.design.motor_gear_units import unit_named
-    from rsea_ros.design.spring_design import least_stiffness, robust_stiffness, spring_design
-    from rsea_ros.report.design import design_json, design_report
-
     place = _output.results_place(args, "out/design", (DESIGN_JSON, REPORT), [args.catalogue])
     values = {name: getattr(args, name) for name in DEMANDS}
     requirement = Requirement(**{**values, "deflection": math.radians(args.deflection)})
     unit = unit_named(args.unit, args.catalogue)
     unit = unit.with_train(args.train) if args.train else unit
-    least = spring_design(requirement, unit, least_stiffness(requirement, unit))
+    least = springs.spring_design(requirement, unit, springs.least_stiffness(requirement, unit))
     asked = least
-    if args.stiffness is not None or requirement == Requirement():
-        asked = spring_design(requirement, unit, STIFFNESS if args.stiffness is None else args.stiffness)
-    enough = robust_stiffness(requirement, unit)
-    robust = spring_design(requirement, unit, enough) if math.isfinite(enough) else None
+    stated = STIFFNESS if args.stiffness is None and requirement == Requirement() else args.stiffness
+    if stated is not None:
+        asked = springs.spring_design(requirement, unit, stated)
+    enough = springs.robust_stiffness(requirement, unit)
+    robust = springs.spring_design(requirement, unit, enough) if math.isfinite(enough) else None
     source = _output.provenance("design", [args.catalogue] if args.catalogue else [])
     with NewFiles(place) as new:
-        path = new.write(DESIGN_JSON, json_text(design_json(asked, least, robust)))
-        report = new.write(REPORT, design_report(asked, least, robust, source))
+        path = new.write(DESIGN_JSON, json_text(page.design_json(asked, least, robust)))
+        report = new.write(REPORT, page.design_report(asked, least, robust, source))
     if args.json:
         _output.print_file(path)
     else:
@@ -76,9 +76,6 @@ def run(args: argparse.Namespace) -> int:
 
 def unstated(d: Any) -> str:
     """Return what nobody stated, with its value: demands that are the paper's, motor and gear."""
-    from rsea_ros.design.mechanism import UNITS
-    from rsea_ros.report import words
-
     mine, papers = vars(d.requirement), vars(Requirement())
     values = {n: (v, words.unit(UNITS[n])) for n, v in mine.items() if v == papers[n]}
     if "deflection" in values:
@@ -88,11 +85,7 @@ def unstated(d: Any) -> str:
 
 
 def _print(asked: Any, least: Any, robust: Any, report: Path) -> None:
-    from rsea_ros.design.spring_design import by_train
-    from rsea_ros.report import words
-    from rsea_ros.report.design import verdict
-
-    say(verdict(asked))
+    say(page.verdict(asked))
     for check in asked.checks:
         value = "not possible" if math.isnan(check.value) else f"{check.value:.4g} {words.unit(check.unit)}"
         sign = ">=" if check.least else "<="
@@ -105,7 +98,7 @@ def _print(asked: Any, least: Any, robust: Any, report: Path) -> None:
         say(f"smallest stiffness that meets all demands on the spring: {least.stiffness:.0f} N·m/rad, {rate}")
     if papers := unstated(asked):
         say(f"not stated, so the paper's: {papers}", indent=2)
-    for row in by_train(asked.requirement, asked.unit, asked.stiffness):
+    for row in springs.by_train(asked.requirement, asked.unit, asked.stiffness):
         low, high = row.band_range
         say(
             f"  {words.train(row.train)}, n = {row.turns:+.0f}: {row.band:.4g} Hz "

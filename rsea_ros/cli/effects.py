@@ -2,22 +2,21 @@
 
 import argparse
 
+from rsea_ros import effects
+from rsea_ros.cli._terminal import say
+from rsea_ros.effects.catalogue import EffectPage, effect_named
+from rsea_ros.effects.parameter import MACHINE
+
 HELP = "list the effects that a diagnosis can name: equation, parameters, units, typical sizes, source"
 EXAMPLE = "rsea effects backlash"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "name", nargs="?", help="the effect to show in full (default: one line for each effect)"
-    )
+    about = "the effect to show in full (default: one line for each effect)"
+    parser.add_argument("name", nargs="?", help=about)
 
 
 def run(args: argparse.Namespace) -> int:
-    from rsea_ros import effects
-    from rsea_ros.cli._terminal import say
-    from rsea_ros.effects.catalogue import EffectPage, effect_named
-    from rsea_ros.effects.parameter import MACHINE
-
     if args.name is None:
         for line in repr(effects).splitlines():
             say(line, indent=4)

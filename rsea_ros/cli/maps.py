@@ -6,6 +6,8 @@ Import maps by name: those in config/imports, beside the rigs.
 import argparse
 from pathlib import Path
 
+from msg_adapters.tables import load_map
+from rsea_ros.cli._terminal import columns, say
 from rsea_ros.documents.wording import did_you_mean
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.rig_file import rig_folders
@@ -19,9 +21,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    from msg_adapters.tables import load_map
-    from rsea_ros.cli._terminal import columns, say
-
     print(columns([(name, load_map(map_path(name)).about) for name in map_names()]))
     print()
     say("rsea import FILE --map NAME uses one; docs/import.md shows how to write your own.")

@@ -6,8 +6,12 @@ from shlex import quote
 
 from rsea_ros.cli._output import add_force, path
 from rsea_ros.cli._terminal import columns, say
+from rsea_ros.documents.units import plain
+from rsea_ros.documents.wording import list_names
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.rig import END_NAMES, Rig
+from rsea_ros.model.rig_file import load_rig, rig_folders
+from rsea_ros.outputs.new_files import check_free, write_file
 
 HELP = "start a rig for your bench (new), or check a rig and show its values (check)"
 EXAMPLE = "rsea rig new my_bench && rsea rig check my_bench.yaml"
@@ -28,9 +32,6 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _new(args: argparse.Namespace) -> int:
-    from rsea_ros.model.rig_file import load_rig, rig_folders
-    from rsea_ros.outputs.new_files import check_free, write_file
-
     if not args.name.isidentifier():
         raise ParameterError(f"name {args.name!r}, expected letters, digits and _, such as left_knee")
     template = next(folder.parent / "templates" / "rig.yaml" for folder in rig_folders())
@@ -43,9 +44,6 @@ def _new(args: argparse.Namespace) -> int:
 
 
 def _check(args: argparse.Namespace) -> int:
-    from rsea_ros.documents.wording import list_names
-    from rsea_ros.model.rig_file import load_rig
-
     rig = load_rig(args.rig)
     say(f"{rig.name}: {rig.about}" if rig.about else rig.name, indent=2)
     rows = [_row(rig, name) for name in sorted(rig.quantities)]
@@ -63,8 +61,6 @@ def _check(args: argparse.Namespace) -> int:
 
 
 def _row(rig: Rig, name: str) -> tuple[str, ...]:
-    from rsea_ros.documents.units import plain
-
     doubt = f"+-{100.0 * rig.spread(name):g} %" if name in rig.free() else "fixed"
     return name, f"{rig[name]:.6g}", plain(rig.unit(name)), doubt, rig.quantities[name].source
 

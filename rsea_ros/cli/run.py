@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
 
-from rsea_ros.cli._graph import need_ros
+from rsea_ros.cli._processes import need_ros
 from rsea_ros.documents.wording import did_you_mean
 from rsea_ros.errors import ParameterError
 

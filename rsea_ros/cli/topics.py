@@ -2,7 +2,7 @@
 
 import argparse
 
-from rsea_ros.cli._graph import need_ros
+from rsea_ros.cli._processes import need_ros
 from rsea_ros.cli._terminal import columns, positive, whole_number
 
 HELP = "show the published topics: list, rate of a topic, its messages (echo)"

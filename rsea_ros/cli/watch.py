@@ -3,9 +3,8 @@
 import argparse
 from pathlib import Path
 
-from rsea_ros.cli._graph import need_ros
 from rsea_ros.cli._output import path
-from rsea_ros.cli._processes import parameter_words
+from rsea_ros.cli._processes import need_ros, parameter_words
 from rsea_ros.cli._terminal import positive
 from rsea_ros.cli._topics import RIG
 from rsea_ros.cli.run import become

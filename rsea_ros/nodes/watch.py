@@ -28,7 +28,7 @@ from rsea_ros.nodes._parameters import AXIS, JOINT, NodeParameter
 from rsea_ros.nodes._qos import COMMAND, LATCHED, MEASUREMENT, await_arrival, publishers_of
 from rsea_ros.nodes._run import Program, run_node
 from rsea_ros.watch.command import Bounds, Commander
-from rsea_ros.watch.runs import Runs
+from rsea_ros.watch.desk import Runs
 from rsea_ros.watch.server import Server
 
 SILENT, GONE = 3.0, 30.0

@@ -3,12 +3,13 @@
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import groupby
 from typing import Literal
 
 import numpy as np
 
 from rsea_ros.trends.fleet_trends import fleet_trends
-from rsea_ros.trends.result import Appearance, Change, FleetTrends, Growth, Interval, Outlier, Trend
+from rsea_ros.trends.result import Appearance, FleetTrends, Growth, Interval, Outlier, Trend
 from rsea_ros.trends.series import DEFAULT, Table, TrendSettings
 
 Kind = Literal["change", "trend", "outlier", "cause", "fault"]
@@ -73,18 +74,13 @@ def alarms_of(fleet: FleetTrends, recordings: Table) -> tuple[Alarm, ...]:
     return tuple(sorted(made, key=lambda a: (a.joint, -a.confidence, a.key)))
 
 
-def runs(changes: tuple[Change, ...]) -> list[list[Change]]:
-    """Return the changes in runs of one direction: wear that is seen as steps first is a ramp later."""
-    out: list[list[Change]] = []
-    for change in changes:
-        same = out and (out[-1][-1].size.value > 0.0) == (change.size.value > 0.0)
-        out[-1].append(change) if same else out.append([change])
-    return out
-
-
 def _of_trend(trend: Trend) -> Iterator[Alarm]:
-    """Yield one alarm for each run of changes; the last is a trend where it goes on."""
-    s, every = trend.series, runs(trend.changes)
+    """Yield one alarm for each run of changes of one direction; the last is a trend where it goes on.
+
+    In runs, as wear that is seen as steps first is a ramp later.
+    """
+    s = trend.series
+    every = [list(run) for _, run in groupby(trend.changes, lambda change: change.size.value > 0.0)]
     level = trend.first.value if trend.first is not None else float("nan")
     for number, run in enumerate(every, 1):
         total = _together([c.size for c in run])

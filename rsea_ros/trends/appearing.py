@@ -7,13 +7,12 @@ from functools import lru_cache
 import numpy as np
 from scipy.optimize import brentq
 from scipy.special import ndtri, stdtr
-from scipy.stats import t
+from scipy.stats import false_discovery_control, t
 
 from rsea_ros.records.record import FloatArray
 from rsea_ros.records.statistics import MAD_TO_SD, Z95
-from rsea_ros.trends.cause_series import Naming
 from rsea_ros.trends.result import Appearance, Growth, Interval, Trend
-from rsea_ros.trends.series import DAY, TrendSettings
+from rsea_ros.trends.series import DAY, Naming, TrendSettings
 
 _SMALLEST = 1e-280
 _SUREST = 37.0
@@ -48,13 +47,7 @@ def adjust(p: FloatArray) -> FloatArray:
     p: shape (n,). Findings of one joint depend on each other, positively, under which the rate still holds
     (Benjamini and Yekutieli 2001, theorem 1.2).
     """
-    if not len(p):
-        return np.zeros(0)
-    order = np.argsort(p)
-    ranked = p[order] * len(p) / np.arange(1, len(p) + 1)
-    q = np.empty(len(p))
-    q[order] = np.minimum(1.0, np.minimum.accumulate(ranked[::-1])[::-1])
-    return q
+    return np.asarray(false_discovery_control(p))
 
 
 def _as_normal(score: float, freedom: int) -> float:

@@ -15,8 +15,8 @@ from rsea_ros.trends.days import Days
 from rsea_ros.trends.result import Interval
 from rsea_ros.trends.series import DAY
 
-_LARGEST = 1e10
-"""Entry of an inverse of scaled normal equations from which columns count as dependent."""
+_DEPENDENT = 1e-10
+"""Eigenvalue of scaled normal equations, relative to the largest, from which columns count as dependent."""
 Kind = Literal["step", "ramp"]
 """A step of the level, or a change of the slope, from a day on."""
 
@@ -40,7 +40,8 @@ class Regression:
             np.maximum(np.sum(self.w[:, None] * self.x**2, axis=0) + self.precision, 1e-300)
         )
         normal = (self.x * scale).T @ (self.w[:, None] * self.x * scale) + np.diag(self.precision * scale**2)
-        return np.asarray(_inverse(normal) * np.outer(scale, scale))
+        inverse = np.linalg.pinv(normal, rcond=_DEPENDENT, hermitian=True)
+        return np.asarray(inverse * np.outer(scale, scale))
 
     @cached_property
     def coefficients(self) -> FloatArray:
@@ -56,16 +57,6 @@ class Regression:
         """Return the regression with further columns, shape (n, k), without a prior."""
         more = np.concatenate([self.precision, np.zeros(columns.shape[1])])
         return Regression(np.column_stack([self.x, columns]), self.y, self.w, more)
-
-
-def _inverse(normal: FloatArray) -> FloatArray:
-    """Return the inverse of scaled normal equations, the least one where columns depend on each other."""
-    try:
-        inverse = np.asarray(np.linalg.inv(normal), float)
-    except np.linalg.LinAlgError:
-        inverse = np.full_like(normal, np.inf)
-    sure = np.max(np.abs(inverse)) < _LARGEST
-    return inverse if sure else np.asarray(np.linalg.pinv(normal, hermitian=True), float)
 
 
 def term(kind: Kind, t: FloatArray, at: float) -> FloatArray:
@@ -118,6 +109,10 @@ class Course:
     slope: bool = False
     terms: tuple[StepOrRamp, ...] = ()
 
+    def with_term(self, i: int, *term: StepOrRamp) -> Course:
+        """Return the course with another term, or none, in a term's place."""
+        return replace(self, terms=(*self.terms[:i], *term, *self.terms[i + 1 :]))
+
     @property
     def t(self) -> FloatArray:
         """Return days from the first one on, shape (n,)."""
@@ -158,19 +153,8 @@ def refine(course: Course, fewest: int) -> Course:
     for i, old in enumerate(course.terms):
         gain = scan(course.regression(without=i), course.t, old.kind) ** 2
         alike = [k.index for j, k in enumerate(course.terms) if j != i and k.kind == old.kind]
-        best = _allowed_gains(gain, alike, fewest)
-        terms = list(course.terms)
-        terms[i] = replace(old, index=int(np.argmax(best)))
-        course = replace(course, terms=tuple(terms))
+        course = course.with_term(i, replace(old, index=int(np.argmax(_allowed_gains(gain, alike, fewest)))))
     return replace(course, terms=tuple(sorted(course.terms, key=lambda k: k.index)))
-
-
-def date_range(course: Course, i: int, doubt: float) -> tuple[int, int]:
-    """Return the first and last day on which a term may begin, by the fall of the likelihood."""
-    old = course.terms[i]
-    gain = scan(course.regression(without=i), course.t, old.kind) ** 2
-    likely = np.flatnonzero(gain >= gain[old.index] - doubt)
-    return int(min(likely[0], old.index)), int(max(likely[-1], old.index))
 
 
 def cost(course: Course, price: float) -> float:
@@ -196,11 +180,11 @@ def _neighbours(course: Course) -> Iterator[Course]:
     if course.slope:
         yield replace(course, slope=False)
     for i in range(len(course.terms)):
-        yield replace(course, terms=course.terms[:i] + course.terms[i + 1 :])
+        yield course.with_term(i)
     for i, old in enumerate(course.terms):
         other = StepOrRamp("ramp" if old.kind == "step" else "step", old.index)
         if other not in course.terms:
-            yield replace(course, terms=(*course.terms[:i], other, *course.terms[i + 1 :]))
+            yield course.with_term(i, other)
 
 
 def _allowed_gains(gain: FloatArray, taken: Sequence[int], fewest: int) -> FloatArray:
@@ -224,7 +208,7 @@ class Dated:
 
     course: Course
     ranges: tuple[tuple[int, int], ...]
-    moved: tuple[tuple[Course, Course], ...]
+    moved: tuple[tuple[Course, ...], ...]
 
     def interval(self, of: Quantity) -> Interval:
         """Return a quantity of the course; its interval spans the dates too, in quadrature."""
@@ -237,16 +221,14 @@ class Dated:
 
 def date_course(course: Course, doubt: float) -> Dated:
     """Return a course with the ranges of its dates. doubt: fall of twice the log likelihood."""
-    ranges = tuple(date_range(course, i, doubt) for i in range(len(course.terms)))
-    moved = tuple(
-        (_move(course, i, first), _move(course, i, last)) for i, (first, last) in enumerate(ranges)
-    )
-    return Dated(course, ranges, moved)
-
-
-def _move(course: Course, i: int, index: int) -> Course:
-    terms: Sequence[StepOrRamp] = course.terms
-    return replace(course, terms=(*terms[:i], replace(terms[i], index=index), *terms[i + 1 :]))
+    ranges, moved = [], []
+    for i, old in enumerate(course.terms):
+        gain = scan(course.regression(without=i), course.t, old.kind) ** 2
+        likely = np.flatnonzero(gain >= gain[old.index] - doubt)
+        first, last = min(int(likely[0]), old.index), max(int(likely[-1]), old.index)
+        ranges.append((first, last))
+        moved.append(tuple(course.with_term(i, replace(old, index=at)) for at in (first, last)))
+    return Dated(course, tuple(ranges), tuple(moved))
 
 
 def combine(r: Regression, row: FloatArray) -> Interval:

@@ -39,7 +39,7 @@ def day_means(series: Series, settings: TrendSettings) -> Days:
     day = np.floor(s.time_s / DAY)
     starts = np.flatnonzero(np.diff(day, prepend=-np.inf))
     y, variance = s.value / scale, np.maximum(s.sd / scale, 1e-9) ** 2
-    weight = 1.0 / (variance + _within(y, variance, starts))
+    weight = 1.0 / (variance + _beyond(y, variance, starts))
     total = np.add.reduceat(weight, starts) if len(starts) else weight
     warmth, mean = _warmth(s.temperature)
 
@@ -87,8 +87,11 @@ def _on_lines(time_s: FloatArray, value: FloatArray) -> FloatArray:
     return np.asarray(np.median(y - slope[:, None] * t, axis=1))
 
 
-def _within(y: FloatArray, variance: FloatArray, starts: np.ndarray) -> float:
-    """Return the variance of recordings of one day beyond their intervals (DerSimonian and Laird 1986)."""
+def _beyond(y: FloatArray, variance: FloatArray, starts: np.ndarray) -> float:
+    """Return the variance within groups beyond that of each value (DerSimonian and Laird 1986).
+
+    starts: place of the first value of each group.
+    """
     if len(starts) in (0, len(y)):
         return 0.0
     w = 1.0 / variance
@@ -187,10 +190,7 @@ def fleet_prior(effects: Sequence[DayEffect]) -> tuple[float, float]:
         return 0.0, _UNKNOWN
     value = np.array([e.per_kelvin for e in known])
     variance = np.array([e.per_kelvin_sd**2 for e in known])
-    w = 1.0 / variance
-    mean = float(np.sum(w * value) / np.sum(w))
-    room = float(np.sum(w) - np.sum(w**2) / np.sum(w))
-    between = max(0.0, (float(np.sum(w * (value - mean) ** 2)) - (len(known) - 1)) / room)
+    between = _beyond(value, variance, np.zeros(1, int))
     w = 1.0 / (variance + between)
     mean = float(np.sum(w * value) / np.sum(w))
     return mean, float(np.sqrt(between + 1.0 / np.sum(w)))

@@ -9,20 +9,19 @@ from scipy.stats import t as student
 from rsea_ros.records.statistics import MAD_TO_SD, Z95
 from rsea_ros.trends import course as courses
 from rsea_ros.trends.appearing import adjust, appearances, scan_threshold, with_course
-from rsea_ros.trends.cause_series import namings, size_series, temperatures
 from rsea_ros.trends.course_search import Tested, change_test, describe
 from rsea_ros.trends.days import DayEffect, Days, day_effect, day_means, fleet_prior
 from rsea_ros.trends.result import Change, FleetTrends, Interval, Outlier, ParameterCourse, Trend
 from rsea_ros.trends.series import (
     DAY,
     DEFAULT,
-    RECORDINGS,
     YEAR,
     Series,
     Table,
     TrendSettings,
     all_series,
-    check_columns,
+    cause_sizes,
+    namings,
 )
 
 _POINTS = 24
@@ -169,10 +168,8 @@ def fleet_trends(history: Table, recordings: Table, settings: TrendSettings = DE
     history: a row for each joint, recording and parameter, columns series.HISTORY; recordings: a row for each
     joint and recording, columns series.RECORDINGS. Raises ParameterError for a table without its columns.
     """
-    check_columns(recordings, RECORDINGS, "recordings")
     every, parameters = list(namings(recordings)), list(all_series(history))
-    warm = temperatures(history, recordings)
-    sized = [s for n in every if n.kind == "cause" and (s := size_series(n, recordings, warm)) is not None]
+    sized = list(cause_sizes(every, history, recordings))
     trends, priors = _trends([*parameters, *sized], settings)
     of_parameters = {(s.joint, s.parameter): trends[s.joint, s.parameter] for s in parameters}
     of_causes = {(s.joint, s.parameter): trends[s.joint, s.parameter] for s in sized}

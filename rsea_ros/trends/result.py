@@ -10,8 +10,7 @@ import numpy as np
 
 from rsea_ros.records.record import FloatArray
 from rsea_ros.records.statistics import Z95
-from rsea_ros.trends.cause_series import Naming
-from rsea_ros.trends.series import DAY, BoolArray, Series
+from rsea_ros.trends.series import DAY, BoolArray, Naming, Series
 
 State = Literal["steady", "changed", "trending", "undetermined"]
 """undetermined: the recordings do not excite the parameter enough to say anything of its course."""

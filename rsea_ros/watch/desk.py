@@ -1,13 +1,153 @@
-"""The requests of pages (commands, recordings, evaluations), and the frames and state sent to them."""
+"""What pages ask for: commands, recordings and their evaluations, each in a child process; what they get."""
 
 import json
+import signal
+import subprocess
+import sys
+import tempfile
 import time
-from collections.abc import Callable, Mapping
-from typing import Any, Protocol
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import IO, Any, Protocol
 
 from rsea_ros.errors import ParameterError, RseaError
+from rsea_ros.outputs.files import unused_path
+from rsea_ros.processes import start, stop
 from rsea_ros.watch.command import KINDS, Commander, Wish
-from rsea_ros.watch.runs import Runs
+
+VERBS = ("identify", "diagnose")
+REPORT = "report.html"
+_TAIL = 4000
+"""Bytes of a process's words that are looked at."""
+
+
+@dataclass
+class Evaluation:
+    """A verb on a recording. state: running, done or failed; words: the last line that it said."""
+
+    folder: Path
+    process: subprocess.Popen[bytes]
+    log: IO[bytes]
+    state: str = "running"
+    words: str = ""
+
+    def look(self) -> None:
+        """Check whether it has ended, and read its output."""
+        if self.state != "running":
+            return
+        status = self.process.poll()
+        self.words = _line(self.log, first=status == 0)
+        if status is not None:
+            self.state = "done" if status == 0 and (self.folder / REPORT).is_file() else "failed"
+            self.log.close()
+
+
+@dataclass
+class Recording:
+    """A bag that is or was written. seconds: its length so far or in the end."""
+
+    bag: Path
+    process: subprocess.Popen[bytes] | None
+    log: IO[bytes]
+    began: float
+    seconds: float = 0.0
+    words: str = ""
+    jobs: dict[str, Evaluation] = field(default_factory=dict)
+
+
+class Runs:
+    """The recordings of this start. folder: where they go.
+
+    record_options: ROS arguments of the node that records. verb_options: of identify and diagnose.
+    """
+
+    def __init__(
+        self, folder: Path, record_options: Sequence[str] = (), verb_options: Sequence[str] = ()
+    ) -> None:
+        self._folder, self._record_options, self._verb_options = folder, record_options, verb_options
+        self._recordings: dict[str, Recording] = {}
+
+    def record(self) -> None:
+        """Start a recording. Raises ParameterError while one runs."""
+        if any(r.process is not None for r in self._recordings.values()):
+            raise ParameterError("a recording runs already")
+        bag = unused_path(self._folder / time.strftime("%Y%m%d-%H%M%S"))
+        words = ["-m", "rsea_ros.nodes.record", "--ros-args", *self._record_options, "-p", f"out:={bag}"]
+        process, log = _python(words)
+        self._recordings[bag.name] = Recording(bag, process, log, time.monotonic())
+
+    def stop(self) -> None:
+        """End the recording that runs: its bag is completed."""
+        for each in self._recordings.values():
+            if each.process is not None:
+                each.process.send_signal(signal.SIGTERM)
+
+    def evaluate(self, name: str, verb: str) -> None:
+        """Do a verb with a recording. Raises ParameterError where it is not complete, and while one runs."""
+        each = self._recordings.get(name)
+        if each is None or each.process is not None or each.words:
+            raise ParameterError(f"recording {name!r}, expected one that is complete")
+        if verb not in VERBS:
+            raise ParameterError(f"{verb!r}, expected one of {', '.join(VERBS)}")
+        if any(job.state == "running" for r in self._recordings.values() for job in r.jobs.values()):
+            raise ParameterError("another recording is being evaluated, expected one at a time")
+        folder = unused_path(each.bag.with_name(f"{each.bag.name}-{verb}"))
+        words = ["-m", "rsea_ros", verb, str(each.bag), "--out", str(folder), *self._verb_options]
+        each.jobs[verb] = Evaluation(folder, *_python(words))
+
+    def report(self, name: str, verb: str) -> Path | None:
+        job = self._recordings[name].jobs.get(verb) if name in self._recordings else None
+        return job.folder / REPORT if job is not None and job.state == "done" else None
+
+    def look(self) -> Sequence[Mapping[str, Any]]:
+        """Update the states, and return all recordings for the page, the newest first."""
+        for each in self._recordings.values():
+            _see_to(each)
+            for job in each.jobs.values():
+                job.look()
+        return [_run_json(name, each) for name, each in reversed(self._recordings.items())]
+
+    def close(self) -> None:
+        """Complete the present recording, and end evaluations."""
+        self.stop()
+        jobs = [job.process for r in self._recordings.values() for job in r.jobs.values()]
+        stop([*jobs, *(r.process for r in self._recordings.values() if r.process is not None)])
+
+
+def _see_to(recording: Recording) -> None:
+    if recording.process is None:
+        return
+    recording.seconds = time.monotonic() - recording.began
+    status = recording.process.poll()
+    if status is not None:
+        recording.process = None
+        complete = status == 0 and recording.bag.exists()
+        recording.words = "" if complete else _line(recording.log) or "failed"
+        recording.log.close()
+
+
+def _run_json(name: str, r: Recording) -> Mapping[str, Any]:
+    jobs = {verb: {"state": job.state, "words": job.words} for verb, job in r.jobs.items()}
+    return {"name": name, "running": r.process is not None, "seconds": round(r.seconds, 1), "words": r.words,
+            "jobs": jobs}  # fmt: skip
+
+
+def _python(words: Sequence[str]) -> tuple[subprocess.Popen[bytes], IO[bytes]]:
+    """Start a program of Python; return its process, and the file that its words go to."""
+    log = tempfile.TemporaryFile()  # noqa: SIM115  it is read until the process has ended
+    return start([sys.executable, *words], stdout=log, stderr=subprocess.STDOUT), log
+
+
+def _line(log: IO[bytes], *, first: bool = False) -> str:
+    """Return the last line with words, or the first."""
+    log.seek(0, 2)
+    size = log.tell()
+    log.seek(0 if first else max(0, size - _TAIL))
+    text = log.read(_TAIL).decode(errors="replace")
+    lines = [line.strip() for line in text.splitlines() if line.strip()] or [""]
+    return lines[0 if first else -1]
+
 
 MOST_WAITING = 10
 """Frames that a slow connection may be behind; further ones it does not get."""

@@ -13,8 +13,7 @@ from urllib.parse import urlsplit
 from tornado.web import HTTPError, RequestHandler
 from tornado.websocket import WebSocketClosedError, WebSocketHandler
 
-from rsea_ros.watch.desk import Desk
-from rsea_ros.watch.runs import Runs
+from rsea_ros.watch.desk import Desk, Runs
 
 PAGE_POLICY = (
     "default-src 'self'; img-src 'self' data:; frame-ancestors 'none'; base-uri 'none'; form-action 'none'"

@@ -15,9 +15,8 @@ from tornado.web import Application
 
 from rsea_ros.errors import RseaError
 from rsea_ros.watch.command import Commander
-from rsea_ros.watch.desk import Desk
+from rsea_ros.watch.desk import Desk, Runs
 from rsea_ros.watch.handlers import Access, addresses, routes
-from rsea_ros.watch.runs import Runs
 
 Samples = Sequence[tuple[float, float]]
 """Time, s, and value of each sample."""

@@ -19,8 +19,7 @@ from rclpy.lifecycle import LifecycleNode
 from msg_adapters.ros import Trigger
 from rsea_ros import processes
 from rsea_ros.cli import main as cli
-from rsea_ros.cli._graph import node_calls
-from rsea_ros.cli._processes import together
+from rsea_ros.cli._processes import node_calls, together
 from rsea_ros.cli.call import offer_of
 from rsea_ros.cli.run import node_names, ros_arguments
 from rsea_ros.errors import ParameterError
@@ -74,7 +73,7 @@ def test_a_node_that_fails_ends_the_others(monkeypatch, capsys):
 
 @pytest.mark.parametrize("words", ["run plant", "launch simulation", "topics", "call", "demo"])
 def test_without_ros_one_line_says_what_is_needed(words, monkeypatch, capsys):
-    monkeypatch.setattr("rsea_ros.cli._graph.find_spec", lambda name: None)
+    monkeypatch.setattr("rsea_ros.cli._processes.find_spec", lambda name: None)
     assert cli.main(words.split()) == 2
     assert "rclpy is missing" in capsys.readouterr().err
 

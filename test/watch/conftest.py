@@ -8,7 +8,7 @@ import time
 import pytest
 
 from rsea_ros.watch.command import Bounds, Commander
-from rsea_ros.watch.runs import Runs
+from rsea_ros.watch.desk import Runs
 from rsea_ros.watch.server import CHANNELS, Server
 
 

@@ -13,9 +13,8 @@ from tornado.websocket import websocket_connect
 
 from rsea_ros.errors import RseaError
 from rsea_ros.watch.command import PATIENCE
-from rsea_ros.watch.desk import MOST_PAGES, MOST_WAITING, Desk
+from rsea_ros.watch.desk import MOST_PAGES, MOST_WAITING, Desk, Runs
 from rsea_ros.watch.handlers import Access, same_origin
-from rsea_ros.watch.runs import Runs
 from rsea_ros.watch.server import Server
 from test.watch.browser import hang_up
 

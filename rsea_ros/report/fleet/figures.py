@@ -8,9 +8,8 @@ from rsea_ros.records.record import FloatArray
 from rsea_ros.report import words
 from rsea_ros.report.figures import figure as fig
 from rsea_ros.report.fleet import words as say
-from rsea_ros.trends.cause_series import Naming
 from rsea_ros.trends.result import Appearance, Binned, Change, Interval, Steps, Trend, bin_days
-from rsea_ros.trends.series import DAY, YEAR
+from rsea_ros.trends.series import DAY, YEAR, Naming
 
 _DAY = "%-d %b\n%Y"
 _FEW = 14
