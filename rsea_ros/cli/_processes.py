@@ -13,23 +13,20 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 from itertools import count
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
-from rsea_ros import processes
 from rsea_ros.documents import strict_yaml
 from rsea_ros.documents.wording import did_you_mean, list_names
 from rsea_ros.errors import ParameterError, RseaError
-from rsea_ros.processes import hold_signals
+from rsea_ros.processes import hold_signals, start as start_process, stop
 
 POLL = 0.1
 """s, interval between checks of the running nodes."""
-stop = processes.stop
 
 
 def start(name: str, arguments: Sequence[str], **options: Any) -> subprocess.Popen[bytes]:
     """Start a node by name, with ROS arguments. options: of Popen."""
-    return processes.start([sys.executable, "-m", f"rsea_ros.nodes.{name}", *arguments], **options)
+    return start_process([sys.executable, "-m", f"rsea_ros.nodes.{name}", *arguments], **options)
 
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -54,9 +51,7 @@ class Processes:
     def __enter__(self) -> Processes:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         with hold_signals():
             self.stop(*self._running)
 

@@ -1,7 +1,5 @@
 """What verbs print and read on a terminal: lines, columns, numbers, progress; safe for any encoding."""
 
-from __future__ import annotations
-
 import argparse
 import codecs
 import math
@@ -11,13 +9,10 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from io import TextIOWrapper
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import Any, TextIO
 
 from rsea_ros.documents.wording import printable
 from rsea_ros.report.words import WIDTH, wrap
-
-if TYPE_CHECKING:
-    from rich.table import Table
 
 _NARROWEST, _NARROWEST_CELL = 40, 16
 """Columns of a line at least; of the last cell of a row: where fewer are left it is not wrapped."""
@@ -42,13 +37,6 @@ def columns(rows: Sequence[Sequence[str]]) -> str:
     most = width() if width() - indent >= _NARROWEST_CELL else indent + widths[-1]
     lines = ("  ".join(c.ljust(w) for c, w in zip(r, widths, strict=True)).rstrip() for r in rows)
     return "\n".join(wrap(line, most, indent) if len(line) > most else line for line in lines)
-
-
-def show(table: Table) -> None:
-    """Print a table as wide as lines may be; cells that may wrap do."""
-    from rich.console import Console
-
-    Console(width=width()).print(table)
 
 
 def whole_number(text: str) -> int:

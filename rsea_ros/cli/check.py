@@ -9,12 +9,15 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
+from rich.console import Console
+
 from msg_adapters import TopicMap, read_record
 from msg_adapters.topic_map import AXES
 from rsea_ros.cli import _terminal
 from rsea_ros.cli._output import FOUND, add_force, path, provenance, results_place
 from rsea_ros.cli._topics import add_runs, add_topic_options, cut, rig_choice, topic_map
 from rsea_ros.errors import RseaError
+from rsea_ros.model.rig_file import load_rig
 from rsea_ros.records.record import Channel, Record
 from rsea_ros.report.result_files import CHECK
 
@@ -38,8 +41,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    from rsea_ros.model.rig_file import load_rig
-
     rig, topics = load_rig(args.rig), topic_map(args)
     place = results_place(args, args.out, CHECK, [*args.bags, args.rig]) if args.out else None
     records = [cut(read_record([bag], topics=topics, strict=False), args) for bag in args.bags]
@@ -84,8 +85,6 @@ def other_axes(bag: str, topics: TopicMap, args: argparse.Namespace) -> Mapping[
 
 
 def _print(checks: list[Findings]) -> None:
-    from rich.console import Console
-
     from rsea_ros.report.check import check_lines, summary
 
     console = Console()

@@ -94,8 +94,7 @@ def record_bench(nodes: Processes, out: Path, duration: float, args: argparse.Na
     ):
         with source(nodes, out, args) as name:
             title = f"{name}, excite, record: chirp and noise for {duration:g} s"
-            measure(nodes, bag, title, {"duration": duration, "seed": args.seed})
-            nodes.stop(name)
+            measure(nodes, bag, title, {"duration": duration, "seed": args.seed}, name)
         disturbances = [f for f in read_record(bag, strict=False).faults if f.kind in DISTURBANCES]
         if not disturbances:
             break
@@ -140,13 +139,13 @@ def patience() -> Mapping[str, float]:
     return cast(Mapping[str, float], content["/**"]["ros__parameters"])
 
 
-def measure(nodes: Processes, bag: Path, title: str, command: Mapping[str, Any]) -> None:
+def measure(nodes: Processes, bag: Path, title: str, command: Mapping[str, Any], *then_stop: str) -> None:
     """Play a command and record it. command: parameters of the node excite."""
     with stage(title) as tell:
         nodes.start("record", {"out": bag})
         nodes.start("excite", {**command, "subscribers": 2})
         nodes.wait("excite", command["duration"] + START_UP, tell)
-        nodes.stop("record")
+        nodes.stop("record", *then_stop)
 
 
 def evaluate(nodes: Processes, bag: Path, out: Path, duration: float) -> None:

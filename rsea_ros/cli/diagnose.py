@@ -5,12 +5,15 @@ from dataclasses import replace
 from pathlib import Path
 from typing import get_args
 
+from rich.console import Console
+
 from msg_adapters import TopicMap, read_record
 from msg_adapters.records import write_overlay
 from rsea_ros.cli import _output, _terminal, _topics
 from rsea_ros.diagnosis.result import Diagnosis, Verdict
 from rsea_ros.diagnosis.settings import MOST_CAUSES, DiagnosisSettings
 from rsea_ros.errors import ParameterError
+from rsea_ros.model.rig_file import load_rig
 from rsea_ros.records.record import Record
 from rsea_ros.report.result_files import DIAGNOSIS, DIAGNOSIS_JSON, MODEL
 
@@ -40,8 +43,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    from rsea_ros.model.rig_file import load_rig
-
     if (args.edited is None) != (args.without_cause is None):
         raise ParameterError("--edited BAG and --without-cause EFFECT: one is given, expected both or none")
     inputs, default = [*args.bags, args.rig, args.holdout, args.edited], f"diagnose-{Path(args.bags[0]).stem}"
@@ -112,8 +113,6 @@ def unexplained_share(result: Diagnosis) -> float:
 
 
 def _print(result: Diagnosis, report: Path) -> None:
-    from rich.console import Console
-
     from rsea_ros.report.diagnosis.words import terminal_lines
     from rsea_ros.report.remark_words import command
     from rsea_ros.report.words import command_row

@@ -1,8 +1,6 @@
 """`rsea fleet`: many bags, joints and months. New recordings become rows of a store, at once (run) or as they
 come (watch); pages (report) and queries (sql) of a store."""
 
-from __future__ import annotations
-
 import argparse
 import csv
 import json
@@ -14,20 +12,19 @@ from dataclasses import replace
 from datetime import date, datetime
 from pathlib import Path
 from shlex import quote
-from typing import TYPE_CHECKING, Any, get_args
+from typing import Any, get_args
 
 from rsea_ros.cli._output import FOUND, Action, add_actions, add_fail_on, add_force, results_place
 from rsea_ros.cli._terminal import columns, progress
 from rsea_ros.documents.wording import printable
 from rsea_ros.errors import ParameterError, RseaError
 from rsea_ros.fleet import FleetError, pool, task
+from rsea_ros.fleet.engine import Engine, EngineLimits, RunSummary
 from rsea_ros.fleet.joints import Diagnose, load_joints
+from rsea_ros.fleet.sources import bags_of
+from rsea_ros.fleet.store import Store, hold_lock, open_store
 from rsea_ros.processes import Stopped
 from rsea_ros.report.result_files import strict
-
-if TYPE_CHECKING:
-    from rsea_ros.fleet.engine import RunSummary
-    from rsea_ros.fleet.store import Store
 
 HELP = "process bags of many joints: store (run), reports (report), alarms (watch), queries (sql)"
 EXAMPLE = "rsea fleet run recordings --map joints.yaml --out store && rsea fleet report store --out report"
@@ -119,8 +116,6 @@ def _hints(args: argparse.Namespace, summary: RunSummary, held: Sequence[task.He
 
 def _recordings(args: argparse.Namespace) -> list[task.Held]:
     """Return the recordings of the sources with the joints that each holds, diagnosed as the options say."""
-    from rsea_ros.fleet.sources import bags_of
-
     joints = load_joints(args.map)
     if args.diagnose:
         joints = tuple(replace(joint, diagnose=args.diagnose) for joint in joints)
@@ -128,9 +123,6 @@ def _recordings(args: argparse.Namespace) -> list[task.Held]:
 
 
 def write_rows(args: argparse.Namespace, out: str, held: Sequence[task.Held]) -> RunSummary:
-    from rsea_ros.fleet.engine import Engine, EngineLimits
-    from rsea_ros.fleet.store import hold_lock, open_store
-
     store = open_store(out, create=True)
     with hold_lock(store, None if args.no_wait else _say_waiting):
         store.finish()
@@ -231,8 +223,6 @@ def _look(args: argparse.Namespace, held: list[task.Held], at_first: bool) -> in
     held: recordings unchanged since the previous look, so that none is still being recorded.
     """
     from rsea_ros.fleet.alarm_files import write_alarms
-    from rsea_ros.fleet.store import open_store
-
     summary = write_rows(args, args.store, held)
     if summary.rows:
         print(summary.sentence(), flush=True)
@@ -254,7 +244,6 @@ def _add_sql(parser: argparse.ArgumentParser) -> None:
 
 def _sql(args: argparse.Namespace) -> int:
     from rsea_ros.fleet.query import answer
-    from rsea_ros.fleet.store import open_store
 
     names, rows = answer(open_store(args.store), args.query)
     if args.json:

@@ -5,10 +5,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import get_args
 
+from rich.console import Console
+
 from msg_adapters import read_record
 from rsea_ros.cli import _output, _topics
-from rsea_ros.cli._terminal import progress, say, show
+from rsea_ros.cli._terminal import progress, say, width
 from rsea_ros.identification.result import Identification, Verdict
+from rsea_ros.model.rig_file import load_rig
 from rsea_ros.report.result_files import IDENTIFICATION, IDENTIFICATION_JSON, MODEL
 
 HELP = "identify frequency response and parameters with intervals from recorded runs"
@@ -25,8 +28,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    from rsea_ros.model.rig_file import load_rig
-
     default = Path("out") / f"identify-{Path(args.bags[0]).stem}"
     place = _output.results_place(args, default, IDENTIFICATION, [*args.bags, args.rig])
     rig, topics = load_rig(args.rig), _topics.topic_map(args)
@@ -59,7 +60,7 @@ def _print(result: Identification, report: Path) -> None:
         print(f"next: {following}")
     for line in fault_lines(result.faults):
         say(f"data: {line}", indent=6)
-    show(words.terminal_table(result, None))
+    Console(width=width()).print(words.terminal_table(result, None))
     off, others = split_off_rig(result.remarks)
     sentences = [*remark_sentences(off), *([right_rig(str(report.parent / MODEL))] if off else [])]
     sentences += words.statics_sentences(result.statics) if result.statics else ()

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from rsea_ros.cli import _output, _topics
 from rsea_ros.cli._terminal import progress, say
+from rsea_ros.model.rig_file import load_rig
 from rsea_ros.report.result_files import LAW, LAW_JSON
 
 HELP = "fit a law to the residual that no known effect explains, and write it as an effect file"
@@ -22,8 +23,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    from rsea_ros.model.rig_file import load_rig
-
     default = Path("out") / f"law-{Path(args.bags[0]).stem}"
     place = _output.results_place(args, default, LAW, [*args.bags, args.rig])
     rig, topics = load_rig(args.rig), _topics.topic_map(args)

@@ -24,12 +24,8 @@ from rsea_ros.records.record import Channel
 
 HELP = "simulate a rig and write a bag, with any effect of the catalogue switched on"
 EXAMPLE = "rsea simulate paper_high_impedance --effect backlash:gap=0.004 --out worn"
-
-
 _MOST_TORQUE, _MOST_TURNED = 100.0, 3.2
 """N m, rad. Larger commands are refused unless --limit allows them."""
-
-
 _OPTIONS = (
     ("rate", "rate", "rate of the commands, Hz"),
     ("amplitude", "amplitude", "amplitude, N·m, for a position loop rad"),

@@ -65,8 +65,6 @@ COLUMNS: Mapping[str, pa.DataType] = {
     "written": pa.timestamp("us", tz="UTC"),
 }
 """`joint` comes first, by the path. bytes, stamp: of the recording's files when it was read."""
-VARYING = ("seconds", "peak_memory", "written", "stamp")
-"""Columns in which two runs on the same recordings may differ."""
 ARROW = pa.schema([pa.field(name, kind) for name, kind in COLUMNS.items()], {"rsea.schema": str(SCHEMA)})
 
 
@@ -94,17 +92,12 @@ def month_of(time: datetime | None) -> str:
 
 def write(rows: Sequence[Mapping[str, Any]], path: Path) -> None:
     """Write rows of one partition as a Parquet file. Raises OSError."""
-    columns = [pa.array([row[name] for row in rows], kind) for name, kind in COLUMNS.items()]
-    write_table(pa.Table.from_arrays(columns, schema=ARROW), path)
-
-
-def write_table(table: pa.Table, path: Path) -> None:
-    parquet.write_table(table, path, compression="zstd")
+    parquet.write_table(pa.Table.from_pylist(rows, schema=ARROW), path, compression=_COMPRESSION)
 
 
 EXPECTED_FILES = "expected whole Parquet files: remove the damaged one, and the next run makes its rows anew"
-_LONGEST = 120
-"""Characters of an error of Parquet."""
+_LONGEST, _COMPRESSION = 120, "zstd"
+"""Characters of an error of Parquet; how its columns are compressed."""
 
 
 def read(file: Path, columns: list[str] | None = None) -> pa.Table:
@@ -137,7 +130,7 @@ def _named(file: Path) -> Iterator[None]:
 
 _PART = "part-"
 _REPLACES = b"rsea.replaces"
-_KEY = ("recording", "model_version", "settings")
+_KEY = ["recording", "model_version", "settings"]
 
 
 def compact(folder: Path, *, loose: bool = False) -> None:
@@ -147,9 +140,15 @@ def compact(folder: Path, *, loose: bool = False) -> None:
     """
     every = sorted(folder.glob("*.parquet"))
     files = [file for file in every if not (loose and file.name.startswith(_PART))]
-    if len(files) > 1:
-        tables = [read(file) for file in files]
-        _replace(folder, files, _once(pa.concat_tables(tables, promote_options="default")))
+    if len(files) < 2:
+        return
+    table = _once(pa.concat_tables([read(file) for file in files], promote_options="default"))
+    names = [file.name for file in files]
+    digest = hashlib.sha256("\n".join(names).encode()).hexdigest()[:16]
+    marked = table.replace_schema_metadata({**(table.schema.metadata or {}), _REPLACES: json.dumps(names)})
+    with NewFiles(folder) as new:
+        parquet.write_table(marked, new.stage(f"{_PART}{digest}.parquet"), compression=_COMPRESSION)
+    _remove(folder, names)
 
 
 def take_out(file: Path, outcomes: Collection[str]) -> None:
@@ -163,22 +162,13 @@ def take_out(file: Path, outcomes: Collection[str]) -> None:
             {key: value for key, value in (kept.schema.metadata or {}).items() if key != _REPLACES}
         )  # the row that comes in a removed one's place may have the name of a file that is replaced
         with NewFiles(Destination(file.parent, force=True)) as new:
-            write_table(plain, new.stage(file.name))
+            parquet.write_table(plain, new.stage(file.name), compression=_COMPRESSION)
 
 
 def finish(folder: Path) -> None:
     """Remove the files of a partition that a killed compaction has replaced. Raises OSError."""
     for part in folder.glob(f"{_PART}*.parquet"):
         _remove(folder, json.loads(metadata(part).get(_REPLACES, b"[]")))
-
-
-def _replace(folder: Path, files: Sequence[Path], table: pa.Table) -> None:
-    names = [file.name for file in files]
-    digest = hashlib.sha256("\n".join(names).encode()).hexdigest()[:16]
-    marked = table.replace_schema_metadata({**(table.schema.metadata or {}), _REPLACES: json.dumps(names)})
-    with NewFiles(folder) as new:
-        write_table(marked, new.stage(f"{_PART}{digest}.parquet"))
-    _remove(folder, names)
 
 
 def _remove(folder: Path, names: Sequence[str]) -> None:
@@ -188,11 +178,7 @@ def _remove(folder: Path, names: Sequence[str]) -> None:
 
 def _once(table: pa.Table) -> pa.Table:
     """Return the rows by time, of those with one key the newest only."""
-    seen: set[tuple[str, ...]] = set()
-    kept = []
-    keys = list(zip(*(table[name].to_pylist() for name in _KEY), strict=True))
-    for place in pc.sort_indices(table, [("written", "descending")]).to_pylist():
-        if keys[place] not in seen:
-            seen.add(keys[place])
-            kept.append(place)
-    return table.take(pa.array(kept, pa.int64())).sort_by([("time", "ascending"), ("recording", "ascending")])
+    newest = table.sort_by([("written", "descending")])
+    keys = newest.select(_KEY).append_column("place", pa.array(range(len(newest)), pa.int64()))
+    kept = keys.group_by(_KEY, use_threads=False).aggregate([("place", "first")])["place_first"]
+    return newest.take(kept).sort_by([("time", "ascending"), ("recording", "ascending")])

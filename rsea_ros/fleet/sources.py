@@ -9,6 +9,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from fsspec.core import url_to_fs
+from fsspec.implementations.local import LocalFileSystem
 
 from rsea_ros.fleet import FleetError
 from rsea_ros.fleet.joints import MappedJoint
@@ -78,7 +79,7 @@ def fingerprint(bag: Bag) -> str:
 def local_copy(bag: Bag) -> Iterator[Path]:
     """Give the path of a recording on this machine; that of a copy, for the block, where it is elsewhere."""
     files, inner = _file_system(bag.url)
-    if _is_local(files):
+    if isinstance(files, LocalFileSystem):
         yield Path(inner)
         return
     with TemporaryDirectory(prefix="rsea-fleet-") as folder:
@@ -112,10 +113,6 @@ def _file_system(url: str) -> tuple[Any, str]:
     return files, inner
 
 
-def _is_local(files: Any) -> bool:
-    return "file" in ([files.protocol] if isinstance(files.protocol, str) else files.protocol)
-
-
 def _files(source: str) -> dict[str, Mapping[str, Any]]:
     """Return the file system's entry of every file under a source, by path or URL."""
     if "::" in source:
@@ -131,7 +128,7 @@ def _files(source: str) -> dict[str, Mapping[str, Any]]:
     except OSError as error:
         raise FleetError(f"{source}: {error.strerror or error}") from None
     shown = {path: info for path, info in bags.items() if not PurePosixPath(path).name.startswith(".")}
-    if _is_local(files):
+    if isinstance(files, LocalFileSystem):
         return shown
     return {files.unstrip_protocol(path): info for path, info in shown.items()}
 
@@ -142,16 +139,10 @@ def _parts(url: str) -> dict[str, Mapping[str, Any]]:
 
 
 def _bags(files: Mapping[str, Mapping[str, Any]]) -> Iterator[Bag]:
-    """Yield folders with metadata as one bag each, and every other file of a bag's kind as another."""
-    folders = {_parent(path) for path in files if path.endswith(f"/{METADATA}")}
-    inside: dict[str, dict[str, Mapping[str, Any]]] = {folder: {} for folder in folders}
-    for path, info in files.items():
-        if (parent := _parent(path)) in folders:
-            inside[parent][path] = info
-        elif path.endswith(_BAGS):
-            yield _bag(path, {path: info})
-    for folder, held in inside.items():
-        yield _bag(folder, held)
+    """Return folders with metadata as one bag each, and every other file of a bag's kind as another."""
+    marked = {_parent(path) for path in files if path.endswith(f"/{METADATA}")}
+    wanted = marked | {path for path in files if path.endswith(_BAGS) and _parent(path) not in marked}
+    return (bag for bag in _all(files) if bag.url in wanted)
 
 
 def _all(files: Mapping[str, Mapping[str, Any]]) -> Iterator[Bag]:

@@ -110,7 +110,11 @@ def open_store(path: str | Path, *, create: bool = False) -> Store:
         if store.path.exists() and (not store.path.is_dir() or any(store.path.iterdir())):
             raise FleetError(f"{path}: not empty and no store, expected a store or a new name")
         make_folder(store.path)
-        _write_mark(mark)
+        try:
+            write_file(mark, json.dumps({"about": "rsea fleet", "schema": SCHEMA}) + "\n")
+        except OSError:  # another run may have written it in the meantime
+            if not mark.exists():
+                raise
     try:
         schema = json.loads(mark.read_text(encoding="utf-8"))["schema"]
     except OSError:
@@ -121,17 +125,6 @@ def open_store(path: str | Path, *, create: bool = False) -> Store:
         raise FleetError(f"{mark}: schema {schema}, expected {SCHEMA}: another version made this store")
     make_folder(store.rows)
     return store
-
-
-def _write_mark(mark: Path) -> None:
-    """Write the mark, unless another run has done so in the meantime."""
-    try:
-        write_file(mark, json.dumps({"about": "rsea fleet", "schema": SCHEMA}) + "\n")
-    except FileExistsError:
-        return
-    except OSError:
-        if not mark.exists():
-            raise
 
 
 @contextmanager

@@ -268,9 +268,8 @@ def step_size(i: int) -> Quantity:
     """Return the quantity that is the size of the step at a term's place."""
 
     def size(course: Course) -> Interval:
-        row = np.zeros(course.at + course.slope + len(course.terms))
-        row[course.at + course.slope + i] = 1.0
-        return combine(course.regression(), row)
+        first = course.at + course.slope
+        return combine(course.regression(), np.eye(first + len(course.terms))[first + i])
 
     return size
 

@@ -63,9 +63,7 @@ def _per_kelvin(course: courses.Course) -> Interval | None:
     if course.days.warmth is None:
         return None
     r = course.regression()
-    row = np.zeros(r.x.shape[1])
-    row[1] = 1.0
-    return Interval(*(v + course.warm for v in courses.combine(r, row)))
+    return Interval(*(v + course.warm for v in courses.combine(r, np.eye(r.x.shape[1])[1])))
 
 
 def _detectable(course: courses.Course, freedom: int, settings: TrendSettings) -> float:

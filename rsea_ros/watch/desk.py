@@ -176,7 +176,7 @@ class Desk:
             "record": lambda page, words: self._runs.record(),
             "stop": lambda page, words: self._runs.stop(),
             "evaluate": lambda page, words: self._runs.evaluate(
-                _text(words, "recording"), _text(words, "verb")
+                _stated(words, "recording"), _stated(words, "verb")
             ),
         }
 
@@ -229,7 +229,8 @@ class Desk:
             raise ParameterError("this page may only look; rsea watch --command lets it command")
         if reason := self.why_not():
             raise ParameterError(reason)
-        wish = Wish(_text(words, "kind"), _number(words, "amplitude"), _number(words, "frequency"))
+        size, frequency = (float(_stated(words, name, int | float)) for name in ("amplitude", "frequency"))
+        wish = Wish(_stated(words, "kind"), size, frequency)
         if not self._commander.hold(page, wish, time.monotonic()):
             raise ParameterError("another page holds the command")
 
@@ -238,15 +239,8 @@ class Desk:
             self._commander.release(page)
 
 
-def _number(words: Mapping[str, Any], name: str) -> float:
+def _stated(words: Mapping[str, Any], name: str, kind: Any = str) -> Any:
     value = words.get(name)
-    if not isinstance(value, int | float):
-        raise ParameterError(f"{name} = {value!r}, expected a number")
-    return float(value)
-
-
-def _text(words: Mapping[str, Any], name: str) -> str:
-    value = words.get(name)
-    if not isinstance(value, str):
-        raise ParameterError(f"{name} = {value!r}, expected a text")
+    if not isinstance(value, kind):
+        raise ParameterError(f"{name} = {value!r}, expected a {'text' if kind is str else 'number'}")
     return value
