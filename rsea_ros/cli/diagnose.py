@@ -9,13 +9,19 @@ from rich.console import Console
 
 from msg_adapters import TopicMap, read_record
 from msg_adapters.records import write_overlay
+from rsea_ros.checks import carried
 from rsea_ros.cli import _output, _terminal, _topics
+from rsea_ros.cli.check import check_records
 from rsea_ros.diagnosis.result import Diagnosis, Verdict
 from rsea_ros.diagnosis.settings import MOST_CAUSES, DiagnosisSettings
+from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.errors import ParameterError
+from rsea_ros.model.extent import bound_values
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.records.record import Record
+from rsea_ros.report.remark_words import command
 from rsea_ros.report.result_files import DIAGNOSIS, DIAGNOSIS_JSON, MODEL
+from rsea_ros.report.words import command_row
 
 HELP = "find the causes of the simulation error: name, size, gain, extended model"
 EXAMPLE = "rsea diagnose run.mcap --rig my_bench.yaml --out results"
@@ -52,15 +58,11 @@ def run(args: argparse.Namespace) -> int:
         tell("reading", 0.0)
         runs = _topics.each_once([*args.bags, *([args.holdout] if args.holdout else [])])
         records = [readable(bag, topics, args) for bag in runs]
-        from rsea_ros.cli.check import check_records
-
         changed = readable(args.edited, topics) if args.edited else None
         raw, records = records[0], check_records(records, rig, topics.axis, quiet=args.json, masks=True)
         holdout = records.pop() if args.holdout else None
-        from rsea_ros.diagnosis.diagnose import (
-            diagnose,  # after the bags, so that a bad one is refused at once
-        )
-        from rsea_ros.effects.catalogue import effect_named
+        # after the bags, so that a bad one is refused at once
+        from rsea_ros.diagnosis.diagnose import diagnose
         from rsea_ros.report.diagnosis.page import write_diagnosis
 
         without = args.without_cause and effect_named(args.without_cause).name
@@ -92,12 +94,9 @@ def readable(bag: str, topics: TopicMap, args: argparse.Namespace | None = None)
 
     Raises BagError or IdentificationError for a run that cannot be diagnosed.
     """
-    from rsea_ros.checks.carried import check_diagnosable
-    from rsea_ros.model.extent import bound_values
-
     record = bound_values(read_record([bag], topics=topics, strict=False))
     record = record if args is None else _topics.cut(record, args)
-    check_diagnosable(record)
+    carried.check_diagnosable(record)
     return record
 
 
@@ -114,8 +113,6 @@ def unexplained_share(result: Diagnosis) -> float:
 
 def _print(result: Diagnosis, report: Path) -> None:
     from rsea_ros.report.diagnosis.words import terminal_lines
-    from rsea_ros.report.remark_words import command
-    from rsea_ros.report.words import command_row
 
     console, width = Console(), _terminal.width()
     for line in terminal_lines(result, width):

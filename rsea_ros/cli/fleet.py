@@ -4,6 +4,7 @@ come (watch); pages (report) and queries (sql) of a store."""
 import argparse
 import csv
 import json
+import os
 import sys
 import time
 from collections.abc import Iterator, Sequence
@@ -130,7 +131,7 @@ def write_rows(args: argparse.Namespace, out: str, held: Sequence[task.Held]) ->
             store.take_out({"quarantined"})
         workers, memory = 0, None
         if not (args.serial or args.scheduler):
-            workers = args.workers or pool.cores()
+            workers = args.workers or len(os.sched_getaffinity(0))
             memory = int(args.memory * GIGA) if args.memory else pool.memory_for(workers)
         limits = EngineLimits(memory, time=args.time_limit * MINUTE, pages=args.pages)
         is_new = any(task.are_new(store, held))

@@ -8,10 +8,12 @@ from typing import get_args
 from rich.console import Console
 
 from msg_adapters import read_record
-from rsea_ros.cli import _output, _topics
-from rsea_ros.cli._terminal import progress, say, width
+from rsea_ros.cli import _output, _terminal, _topics
+from rsea_ros.cli._terminal import progress, say
+from rsea_ros.cli.check import check_records
 from rsea_ros.identification.result import Identification, Verdict
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.report.remark_words import fault_lines, remark_sentences, right_rig, split_off_rig
 from rsea_ros.report.result_files import IDENTIFICATION, IDENTIFICATION_JSON, MODEL
 
 HELP = "identify frequency response and parameters with intervals from recorded runs"
@@ -35,8 +37,6 @@ def run(args: argparse.Namespace) -> int:
         tell("reading", 0.0)
         bags = _topics.each_once(args.bags)
         records = [_topics.cut(read_record([bag], topics=topics), args) for bag in bags]
-        from rsea_ros.cli.check import check_records
-
         records = check_records(records, rig, topics.axis, quiet=args.json, masks=False)
         from rsea_ros.identification.identify import identify  # 0.7 s: a refused bag need not wait for it
         from rsea_ros.report.identification import write_results
@@ -53,14 +53,13 @@ def run(args: argparse.Namespace) -> int:
 
 def _print(result: Identification, report: Path) -> None:
     from rsea_ros.report import identification as words
-    from rsea_ros.report.remark_words import fault_lines, remark_sentences, right_rig, split_off_rig
 
     say(words.verdict_sentence(result))
     if following := words.next_command(result):
         print(f"next: {following}")
     for line in fault_lines(result.faults):
         say(f"data: {line}", indent=6)
-    Console(width=width()).print(words.terminal_table(result, None))
+    Console(width=_terminal.width()).print(words.terminal_table(result, None))
     off, others = split_off_rig(result.remarks)
     sentences = [*remark_sentences(off), *([right_rig(str(report.parent / MODEL))] if off else [])]
     sentences += words.statics_sentences(result.statics) if result.statics else ()

@@ -6,7 +6,10 @@ from pathlib import Path
 
 from rsea_ros.cli import _output, _topics
 from rsea_ros.cli._terminal import progress, say
+from rsea_ros.cli.check import check_records
+from rsea_ros.cli.diagnose import readable
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.report.remark_words import rig_named
 from rsea_ros.report.result_files import LAW, LAW_JSON
 
 HELP = "fit a law to the residual that no known effect explains, and write it as an effect file"
@@ -28,32 +31,26 @@ def run(args: argparse.Namespace) -> int:
     rig, topics = load_rig(args.rig), _topics.topic_map(args)
     with progress("law") as tell:
         tell("reading", 0.0)
-        from rsea_ros.cli.check import check_records
-        from rsea_ros.cli.diagnose import readable
-
         records = [readable(bag, topics, args) for bag in _topics.each_once(args.bags)]
         records = check_records(records, rig, topics.axis, quiet=args.json, masks=True)
         from rsea_ros.laws.effect_source import LawProvenance
         from rsea_ros.laws.learn import learn
-        from rsea_ros.report.law import write_law
+        from rsea_ros.report import law as page
 
         where = _output.provenance("law", args.bags, args.rig)
         bags = {Path(path).name: digest for path, digest in list(where.files.items())[: len(args.bags)]}
         result = learn(records, rig, LawProvenance(where.date, where.version, bags, ""), tell)
         result = replace(result, rig_choice=_topics.rig_choice(args))
-        report = write_law(result, place, where)
+        report = page.write_law(result, place, where)
     if args.json:
         _output.print_file(report.parent / LAW_JSON)
     else:
-        from rsea_ros.report.law import gain_sentence, headline, law_lines
-        from rsea_ros.report.remark_words import rig_named
-
-        say(headline(result))
+        say(page.headline(result))
         print(f"rig         {rig_named(result.rig_name, result.rig_choice)}")
-        for line in law_lines(result):
+        for line in page.law_lines(result):
             say(f"  {line}", indent=6)
         if result.laws:
-            say(gain_sentence(result), indent=2)
+            say(page.gain_sentence(result), indent=2)
             print(f"effect      {', '.join(str(report.parent / (w.law.name + '.py')) for w in result.laws)}")
         print(f"report      {report}")
     finding = "law" if result.laws else "at_noise_floor" if result.at_floor else "no_law"

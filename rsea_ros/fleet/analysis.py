@@ -31,16 +31,8 @@ from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_document import rig_from_document
 from rsea_ros.model.rig_file import rig_text
 from rsea_ros.records.record import UNITS, Fault, Record
+from rsea_ros.report import result_files
 from rsea_ros.report.identification import identification_json
-from rsea_ros.report.result_files import (
-    DIAGNOSIS_JSON,
-    IDENTIFICATION_JSON,
-    MODEL,
-    REPORT,
-    json_text,
-    pick,
-    strict,
-)
 
 _DATED_NS = 10**17
 """Stamps below (1973) count since a machine's start, not since 1970."""
@@ -104,11 +96,11 @@ def analyse(row: Row, path: Path, url: str, joint: MappedJoint, *, page: bool = 
     result = identify([with_faults(_fit_for_fit(run, rig), findings, masks=False)], rig)
     times = result.times_noise
     main = next((n for n in _MAIN if n in times), next(iter(times), ""))
-    row |= {"verdict": result.verdict, "residual": strict(times.get(main, math.nan))}
+    row |= {"verdict": result.verdict, "residual": result_files.strict(times.get(main, math.nan))}
     row["parameters"] = [_parameter(p) for p in result.parameters]
     files = {
-        IDENTIFICATION_JSON: json_text(identification_json(result)),
-        MODEL: rig_text(result.rig),
+        result_files.IDENTIFICATION_JSON: result_files.json_text(identification_json(result)),
+        result_files.MODEL: rig_text(result.rig),
     }
     if joint.diagnose == "always" or (joint.diagnose == "misfit" and result.verdict == "misfit"):
         files |= _diagnose(row, with_faults(record, findings, masks=True), rig, page=page)
@@ -145,15 +137,15 @@ def _diagnose(row: Row, record: Record, rig: Rig, *, page: bool) -> dict[str, st
     causes = [_cause(c) for c in result.causes]
     row |= {"diagnosis": result.verdict, "causes": causes, "parameters": parameters}
     files = {
-        DIAGNOSIS_JSON: json_text(diagnosis_json(result)),
+        result_files.DIAGNOSIS_JSON: result_files.json_text(diagnosis_json(result)),
         "extended.yaml": rig_text(result.extended_rig),
     }
-    return files | ({REPORT: diagnosis_report(result)} if page else {})
+    return files | ({result_files.REPORT: diagnosis_report(result)} if page else {})
 
 
 def _interval(name: str, estimate: Any) -> dict[str, Any]:
-    low, high = map(strict, estimate.ci95)
-    return {"name": name, **pick(estimate, "value unit"), "low": low, "high": high}
+    low, high = map(result_files.strict, estimate.ci95)
+    return {"name": name, **result_files.pick(estimate, "value unit"), "low": low, "high": high}
 
 
 def _parameter(p: ParameterEstimate) -> dict[str, Any]:
@@ -162,7 +154,7 @@ def _parameter(p: ParameterEstimate) -> dict[str, Any]:
 
 def _cause(cause: Any) -> dict[str, Any]:
     sizes = [_interval(name, size) for name, size in cause.parameters.items()]
-    return {**pick(cause, "name status probability gain=gain_holdout"), "sizes": sizes}
+    return {**result_files.pick(cause, "name status probability gain=gain_holdout"), "sizes": sizes}
 
 
 def excitation(record: Record) -> list[dict[str, Any]]:
@@ -181,7 +173,7 @@ def excitation(record: Record) -> list[dict[str, Any]]:
         if channel in record and np.isfinite(record[channel].y).any():
             span = float(np.nanmax(record[channel].y) - np.nanmin(record[channel].y))
             figures.append((f"{channel}_span", span, unit))
-    return [{"name": n, "value": strict(v), "unit": u} for n, v, u in figures]
+    return [{"name": n, "value": result_files.strict(v), "unit": u} for n, v, u in figures]
 
 
 def faults(listed: Iterable[Fault]) -> list[dict[str, Any]]:

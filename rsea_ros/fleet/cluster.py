@@ -27,6 +27,7 @@ NAMES = 1000
 _ADDRESS = re.compile(r"(\w+://)?(\[[0-9a-fA-F:]+\]|[^\s/:]+):\d+/?")
 """HOST:PORT with or without a protocol: Dask tries anything else for a minute."""
 CONNECT = "30s"
+_LOST = "the scheduler is lost: what was done is in the store, run again to go on"
 COUNTED_EVERY = 10.0
 """s, after which the workers are counted anew: those of another cluster come and go."""
 
@@ -65,7 +66,7 @@ class OnDask:
             return None
         job, _ = self._jobs.pop(future.key)
         if future.status in ("cancelled", "lost"):
-            raise self._lost_error()
+            raise FleetError(_LOST)
         try:
             return Done(job, future.result())
         except KilledWorker as error:
@@ -78,10 +79,7 @@ class OnDask:
 
     def _check(self) -> None:
         if self._client.status != "running":
-            raise self._lost_error()
-
-    def _lost_error(self) -> FleetError:
-        return FleetError("the scheduler is lost: what was done is in the store, run again to go on")
+            raise FleetError(_LOST)
 
 
 @contextmanager

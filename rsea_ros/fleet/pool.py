@@ -240,10 +240,6 @@ def frequent_collection() -> Iterator[None]:
         gc.unfreeze()
 
 
-def cores() -> int:
-    return len(os.sched_getaffinity(0))
-
-
 def memory_for(workers: int) -> int:
     """Return the memory (bytes) of each worker: this machine's, or that of its control group, divided."""
     total = os.sysconf("SC_PHYS_PAGES") * _PAGE

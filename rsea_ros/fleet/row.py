@@ -113,12 +113,6 @@ def read(file: Path, columns: list[str] | None = None) -> pa.Table:
     return table
 
 
-def metadata(file: Path) -> dict[Any, Any]:
-    """Return the metadata of a file. Raises FleetError for a damaged file."""
-    with _named(file):
-        return dict(parquet.read_schema(file).metadata or {})
-
-
 @contextmanager
 def _named(file: Path) -> Iterator[None]:
     """Let an error of a damaged file name it."""
@@ -166,9 +160,14 @@ def take_out(file: Path, outcomes: Collection[str]) -> None:
 
 
 def finish(folder: Path) -> None:
-    """Remove the files of a partition that a killed compaction has replaced. Raises OSError."""
+    """Remove the files of a partition that a killed compaction has replaced.
+
+    Raises OSError, and FleetError for a damaged file.
+    """
     for part in folder.glob(f"{_PART}*.parquet"):
-        _remove(folder, json.loads(metadata(part).get(_REPLACES, b"[]")))
+        with _named(part):
+            marks = parquet.read_schema(part).metadata or {}
+        _remove(folder, json.loads(marks.get(_REPLACES, b"[]")))
 
 
 def _remove(folder: Path, names: Sequence[str]) -> None:

@@ -145,19 +145,16 @@ def work(task: Task) -> TaskOutcome:
             row |= {"outcome": "quarantined", "reason": slow}
         except Exception as error:
             row |= {"outcome": "quarantined", "reason": reason(_fault(error))}
-    if _now(task.bag) != task.bag:
+    present = None
+    with suppress(RseaError):
+        present = relist(task.bag)
+    if present != task.bag:
         raise Changed(task.bag.url)
     return TaskOutcome(row | {"seconds": time.perf_counter() - begin, "peak_memory": _peak()}, files)
 
 
 def reason(text: str) -> str:
     return brief(" ".join(text.split()), _LONGEST)
-
-
-def _now(bag: Bag) -> Bag | None:
-    with suppress(RseaError):
-        return relist(bag)
-    return None
 
 
 def _fault(error: Exception) -> str:

@@ -122,9 +122,8 @@ def _always(named: FloatArray, usual: float) -> float:
     share = float(np.mean(named))
     if share < _MOSTLY or usual > _RARELY:
         return 0.0
-    return float(
-        _likelihood(np.sum(named), len(named), share) - _likelihood(np.sum(named), len(named), usual)
-    )
+    k, n = float(np.sum(named)), float(len(named))
+    return float(_likelihood(k, n, share) - _likelihood(k, n, usual))
 
 
 def _ratios(named: FloatArray, usual: float) -> FloatArray:

@@ -153,7 +153,7 @@ def refine(course: Course, fewest: int) -> Course:
     for i, old in enumerate(course.terms):
         gain = scan(course.regression(without=i), course.t, old.kind) ** 2
         alike = [k.index for j, k in enumerate(course.terms) if j != i and k.kind == old.kind]
-        course = course.with_term(i, replace(old, index=int(np.argmax(_allowed_gains(gain, alike, fewest)))))
+        course = course.with_term(i, replace(old, index=int(np.argmax(allowed_gains(gain, alike, fewest)))))
     return replace(course, terms=tuple(sorted(course.terms, key=lambda k: k.index)))
 
 
@@ -187,7 +187,7 @@ def _neighbours(course: Course) -> Iterator[Course]:
             yield course.with_term(i, other)
 
 
-def _allowed_gains(gain: FloatArray, taken: Sequence[int], fewest: int) -> FloatArray:
+def allowed_gains(gain: FloatArray, taken: Sequence[int], fewest: int) -> FloatArray:
     """Return the gains, none within `fewest` days of an end or of another term of the kind."""
     allowed: FloatArray = gain.copy()
     allowed[:fewest] = -1.0

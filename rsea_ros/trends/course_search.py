@@ -12,7 +12,7 @@ import numpy as np
 
 from rsea_ros.records.record import FloatArray
 from rsea_ros.trends.appearing import scan_p, scan_threshold
-from rsea_ros.trends.course import Course, Kind, StepOrRamp, cost, course_of, improve, scan
+from rsea_ros.trends.course import Course, Kind, StepOrRamp, allowed_gains, cost, course_of, improve, scan
 from rsea_ros.trends.days import DayEffect, Days, day_effect
 from rsea_ros.trends.series import TrendSettings
 
@@ -113,11 +113,8 @@ def _complete(course: Course, price: float, settings: TrendSettings) -> Course:
 
 def _best(course: Course, fewest: int) -> tuple[StepOrRamp, float]:
     """Return the term that gains most, and its |z|."""
-    regression, scores = course.regression(), {}
-    for kind in _KINDS:
-        z = np.abs(scan(regression, course.t, kind))
-        z[:fewest], z[len(z) - fewest + 1 :] = 0.0, 0.0
-        scores[kind] = z
+    regression = course.regression()
+    scores = {k: allowed_gains(np.abs(scan(regression, course.t, k)), (), fewest) for k in _KINDS}
     kind = max(_KINDS, key=lambda k: float(np.max(scores[k])))
     index = int(np.argmax(scores[kind]))
     return StepOrRamp(kind, index), float(scores[kind][index])

@@ -164,7 +164,8 @@ def fleet_trends(history: Table, recordings: Table, settings: TrendSettings = DE
     """Return the trends of a fleet.
 
     history: a row for each joint, recording and parameter, columns series.HISTORY; recordings: a row for each
-    joint and recording, columns series.RECORDINGS. Raises ParameterError for a table without its columns.
+    joint and recording, columns series.RECORDINGS, faults and causes as in the store's rows.
+    Raises ParameterError for a table without its columns.
     """
     every, parameters = list(namings(recordings)), list(all_series(history))
     sized = list(cause_sizes(every, history, recordings))

@@ -125,10 +125,8 @@ def all_series(history: Table) -> Iterator[Series]:
     other = (joint[1:] != joint[:-1]) | (parameter[1:] != parameter[:-1])
     edges = [0, *(np.flatnonzero(other) + 1), len(joint)] if len(joint) else []
     for a, b in itertools.pairwise(edges):
-        if str(parameter[a]).startswith(CLOCKS):
-            continue
-        part = {n: c[a:b] for n, c in columns.items()}
-        yield _series(str(joint[a]), str(parameter[a]), part)
+        if not str(parameter[a]).startswith(CLOCKS):
+            yield _series(str(joint[a]), str(parameter[a]), {n: c[a:b] for n, c in columns.items()})
 
 
 def _series(joint: str, parameter: str, part: Table) -> Series:
@@ -200,19 +198,15 @@ def namings(recordings: Table) -> Iterator[Naming]:
 
 
 def _faults(joint: str, rows: np.ndarray, time_s: FloatArray, faults: npt.NDArray[Any]) -> Iterator[Naming]:
-    held = (faults[i] if faults[i] is not None else () for i in rows)
-    kinds = [{str(f["kind"] if isinstance(f, Mapping) else f) for f in every} for every in held]
+    kinds = [{str(f["kind"]) for f in faults[i]} for i in rows]
     for kind in sorted(set().union(*kinds)):
         yield Naming(joint, kind, "fault", rows, time_s[rows], np.array([kind in k for k in kinds]))
 
 
 def _causes(joint: str, rows: np.ndarray, time_s: FloatArray, causes: npt.NDArray[Any]) -> Iterator[Naming]:
-    bare: Mapping[str, Any] = {"status": "confirmed", "probability": 1.0, "gain": float("nan"), "sizes": ()}
-    of_rows = [causes[i] if causes[i] is not None else () for i in rows]
-    stated = [[c if isinstance(c, Mapping) else {"name": str(c), **bare} for c in row] for row in of_rows]
     of_row = [
-        {c["name"]: c for c in row if c["status"] != "one_of" or float(c["probability"]) >= _LIKELY}
-        for row in stated
+        {c["name"]: c for c in causes[i] if c["status"] != "one_of" or float(c["probability"]) >= _LIKELY}
+        for i in rows
     ]
     for name in sorted(set().union(*of_row)):
         of_recording = [row.get(name) for row in of_row]

@@ -74,7 +74,7 @@ def test_the_detection_limit_is_the_size_of_the_least_gain():
 
 
 def test_bad_data_since_some_day_is_a_fault():
-    names = recordings(JOINTS, 60, faults=lambda j, d: ["outliers"] if j == "e" and d >= 30 else [])
+    names = recordings(JOINTS, 60, faults=lambda j, d: [{"kind": "outliers"}] if j == "e" and d >= 30 else [])
     (alarm,) = alarms(QUIET, names)
     assert (alarm.joint, alarm.kind, alarm.about, alarm.size) == ("e", "fault", "outliers", None)
 
@@ -107,7 +107,7 @@ def test_the_key_of_wear_stays_while_its_history_grows():
 
 def test_an_ongoing_change_comes_before_bad_data():
     names = recordings(
-        JOINTS, 60, faults=lambda j, d: ["outliers"] if j == "a" and d >= 30 else [],
+        JOINTS, 60, faults=lambda j, d: [{"kind": "outliers"}] if j == "a" and d >= 30 else [],
         causes=lambda j, d: [cause("backlash", 2e-3)] if j == "h" and d >= 30 else [],
     )  # fmt: skip
     assert list(by_joint(alarms(QUIET, names))) == ["h", "a"]
