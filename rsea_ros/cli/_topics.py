@@ -17,13 +17,11 @@ def add_topic_options(parser: argparse.ArgumentParser, window: bool = False) -> 
     """Declare --namespace, --topic, --joint and --axis; with `window` those of a part of a record."""
     default, axes = TopicMap(), ", ".join(AXES)
     add = parser.add_argument_group("topics of another machine").add_argument
-    about = "namespace of the topics (default %(default)s)"
-    add("--namespace", default=default.namespace, help=about)
+    add("--namespace", default=default.namespace, help="namespace of the topics (default %(default)s)")
     about = f"another topic name; ROLE: {', '.join(ROLES)}; TOPIC[2]: the third of numbers without names"
     add("--topic", action="append", default=[], metavar="ROLE=TOPIC", help=about)
     add("--joint", help="name of the joint, if the messages hold several")
-    about = f"actuator axis of the wrench: {axes}; a leading - reverses it"
-    add("--axis", default=default.axis, help=about)
+    add("--axis", default=default.axis, help=f"actuator axis of the wrench: {axes}; a leading - reverses it")
     if window:
         add = parser.add_argument_group("a part of the record, s since its first stamp").add_argument
         add("--from", dest="begin", type=float, metavar="S", help="leave out samples before S")

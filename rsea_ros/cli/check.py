@@ -35,8 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--json", action="store_true", help="print the findings as JSON (docs/check.md) and nothing else")
     add("--out", type=path, help="directory for report.html and check.json (default: none is written)")
     add_force(parser)
-    about = f"exit status {FOUND} if a light is this one or worse"
-    add("--fail-on", choices=("red", "amber"), help=about)
+    add("--fail-on", choices=("red", "amber"), help=f"exit status {FOUND} if a light is this one or worse")
     add_topic_options(parser, window=True)
 
 

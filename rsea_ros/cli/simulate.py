@@ -53,8 +53,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     about = "period of multisine and steps, s (default %(default)s)"
     add("--period", type=float, default=default.period, help=about)
     add("--limit", type=float, help="largest command allowed (default 100 N·m, for a position loop 3.2 rad)")
-    about = "seed of command and sensor noise (default %(default)s)"
-    add("--seed", type=whole_number, default=0, help=about)
+    add("--seed", type=whole_number, default=0, help="seed of command and sensor noise (default %(default)s)")
     add("--no-noise", action="store_true", help="simulate perfect sensors")
     add_topic_options(parser)
 

@@ -57,7 +57,7 @@ class OnDask:
         self._jobs[future.key] = job, future
         future.add_done_callback(self._done.put)
 
-    def next(self, timeout: float | None) -> Done | None:
+    def next(self, timeout: float) -> Done | None:
         """Wait for a job that is done. Raises FleetError where the scheduler is lost."""
         try:
             future = self._done.get(timeout=timeout)

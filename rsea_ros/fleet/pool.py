@@ -57,7 +57,7 @@ class Executor(Protocol):
     def submit(self, job: Job) -> None:
         """Take a job."""
 
-    def next(self, timeout: float | None) -> Done | None:
+    def next(self, timeout: float) -> Done | None:
         """Wait for a job that is done; None after a timeout (s)."""
 
 
@@ -72,7 +72,7 @@ class Serial:
     def submit(self, job: Job) -> None:
         self._jobs.append(job)
 
-    def next(self, timeout: float | None) -> Done | None:
+    def next(self, timeout: float) -> Done | None:
         job = self._jobs.popleft()
         try:
             return Done(job, job.function(job.argument))
@@ -130,18 +130,18 @@ class Pool:
         self._ready.append(job)
         self._hand_out()
 
-    def next(self, timeout: float | None) -> Done | None:
+    def next(self, timeout: float) -> Done | None:
         """Wait for a job that is done, or whose worker has ended; None after a timeout (s)."""
-        until = None if timeout is None else time.monotonic() + timeout
+        until = time.monotonic() + timeout
         while True:
             self._end_greedy()
-            left = LOOKED_AT_EVERY if until is None else until - time.monotonic()
+            left = until - time.monotonic()
             busy = {worker.pipe: worker for worker in self._workers if worker.job is not None}
             for pipe in wait(list(busy), max(0.0, min(LOOKED_AT_EVERY, left))):
                 done = self._take(busy[pipe])  # type: ignore[index]
                 self._hand_out()
                 return done
-            if until is not None and time.monotonic() >= until:
+            if time.monotonic() >= until:
                 return None
 
     def close(self) -> None:

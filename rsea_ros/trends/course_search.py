@@ -45,7 +45,7 @@ def change_test(days: Days, effect: DayEffect, prior: tuple[float, float], setti
     beside = _effect_beside(course, best, settings)
     anew = course_of(days, beside.variance, prior)
     z = float(abs(scan(anew.regression(), anew.t, best.kind)[best.index]))
-    return Tested(course, effect, beside, prior, scan_p(z, _share(days, settings), beside.freedom))
+    return Tested(course, effect, beside, prior, scan_p(z, end_share(days, settings), beside.freedom))
 
 
 def _effect_beside(course: Course, change: StepOrRamp, settings: TrendSettings) -> DayEffect:
@@ -63,7 +63,7 @@ def describe(test: Tested, settings: TrendSettings) -> Course:
     """
     days = test.course.days
     rate = settings.false_discovery
-    price = scan_threshold(rate, _share(days, settings), test.beside.freedom) ** 2
+    price = scan_threshold(rate, end_share(days, settings), test.beside.freedom) ** 2
     course = course_of(days, test.beside.variance, test.prior)
     best = min(_candidates(course, price, settings), key=lambda c: cost(c, price))
     days = _at_level(best)
@@ -120,7 +120,8 @@ def _best(course: Course, fewest: int) -> tuple[StepOrRamp, float]:
     return StepOrRamp(kind, index), float(scores[kind][index])
 
 
-def _share(days: Days, settings: TrendSettings) -> float:
+def end_share(days: Days, settings: TrendSettings) -> float:
+    """Return the share of the days at each end where no change is looked for."""
     return min(0.4, settings.fewest_beside / len(days.t))
 
 

@@ -9,7 +9,7 @@ from scipy.stats import t as student
 from rsea_ros.records.statistics import MAD_TO_SD, Z95
 from rsea_ros.trends import course as courses
 from rsea_ros.trends.appearing import adjust, appearances, scan_threshold, with_course
-from rsea_ros.trends.course_search import Tested, change_test, describe
+from rsea_ros.trends.course_search import Tested, change_test, describe, end_share
 from rsea_ros.trends.days import DayEffect, Days, day_effect, day_means, fleet_prior
 from rsea_ros.trends.result import Change, FleetTrends, Interval, Outlier, ParameterCourse, Trend
 from rsea_ros.trends.series import (
@@ -68,10 +68,9 @@ def _per_kelvin(course: courses.Course) -> Interval | None:
 
 def _detectable(course: courses.Course, freedom: int, settings: TrendSettings) -> float:
     """Return the least step at mid-series that would stand out, relative to the scale."""
-    t, n = course.t, len(course.t)
-    longer = course.base.with_columns(courses.term("step", t, t[n // 2])[:, None])
-    share = min(0.4, settings.fewest_beside / n)
-    b = scan_threshold(settings.false_discovery, share, freedom)
+    t = course.t
+    longer = course.base.with_columns(courses.term("step", t, t[len(t) // 2])[:, None])
+    b = scan_threshold(settings.false_discovery, end_share(course.days, settings), freedom)
     return b * float(np.sqrt(longer.covariance[-1, -1]))
 
 

@@ -141,8 +141,7 @@ def _python(words: Sequence[str]) -> tuple[subprocess.Popen[bytes], IO[bytes]]:
 
 def _line(log: IO[bytes], *, first: bool = False) -> str:
     """Return the last line with words, or the first."""
-    log.seek(0, 2)
-    size = log.tell()
+    size = log.seek(0, 2)
     log.seek(0 if first else max(0, size - _TAIL))
     text = log.read(_TAIL).decode(errors="replace")
     lines = [line.strip() for line in text.splitlines() if line.strip()] or [""]

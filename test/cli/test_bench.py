@@ -14,7 +14,7 @@ import yaml
 from bench.__main__ import _parser, _print, index, main as run_bench
 from bench.frozen.cases import generated
 from bench.results import read_lines, resumed, write_pages
-from rsea_ros.cli._processes import node_calls
+from rsea_ros.cli.launch import node_calls
 from rsea_ros.errors import DeviceError
 from rsea_ros.hardware.peer.remote import RemoteBench
 from rsea_ros.model.rig_file import load_rig, rig_folders

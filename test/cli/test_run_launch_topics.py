@@ -19,8 +19,8 @@ from rclpy.lifecycle import LifecycleNode
 from msg_adapters.ros import Trigger
 from rsea_ros import processes
 from rsea_ros.cli import main as cli
-from rsea_ros.cli._processes import node_calls, together
 from rsea_ros.cli.call import offer_of
+from rsea_ros.cli.launch import node_calls, together
 from rsea_ros.cli.run import node_names, ros_arguments
 from rsea_ros.errors import ParameterError
 from rsea_ros.nodes import _visitor
@@ -65,7 +65,7 @@ def test_a_node_that_fails_ends_the_others(monkeypatch, capsys):
         begun.append(processes.start(programs[name]))
         return begun[-1]
 
-    monkeypatch.setattr("rsea_ros.cli._processes.start", start)
+    monkeypatch.setattr("rsea_ros.cli.launch.start", start)
     assert together(dict.fromkeys(programs, ())) == 2
     assert "model ended with status 2" in capsys.readouterr().out
     assert [each.poll() for each in begun] == [-signal.SIGTERM, 2]
