@@ -95,7 +95,8 @@ def _print(asked: Any, least: Any, robust: Any, report: Path) -> None:
     if asked is least:
         say(f"no softer spring meets them: {rate}")
     else:
-        say(f"smallest stiffness that meets all demands on the spring: {least.stiffness:.0f} N·m/rad, {rate}")
+        smallest = f"{page.whole(least.stiffness)} N·m/rad, {rate}"
+        say(f"smallest stiffness that meets all demands on the spring: {smallest}")
     if papers := unstated(asked):
         say(f"not stated, so the paper's: {papers}", indent=2)
     for row in springs.by_train(asked.requirement, asked.unit, asked.stiffness):

@@ -49,14 +49,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    if (args.edited is None) != (args.without_cause is None):
+    if bool(args.edited) != bool(args.without_cause) or args.edited == "":
         raise ParameterError("--edited BAG and --without-cause EFFECT: one is given, expected both or none")
     inputs, default = [*args.bags, args.rig, args.holdout, args.edited], f"diagnose-{Path(args.bags[0]).stem}"
     place = _output.results_place(args, Path("out") / default, DIAGNOSIS, inputs)
     rig, topics = load_rig(args.rig), _topics.topic_map(args)
     with _terminal.progress("diagnose") as tell:
         tell("reading", 0.0)
-        runs = _topics.each_once([*args.bags, *([args.holdout] if args.holdout else [])])
+        runs = [*args.bags, *([args.holdout] if args.holdout else [])]
+        _topics.each_once([*runs, *([args.edited] if args.edited else [])])
         records = [readable(bag, topics, args) for bag in runs]
         changed = readable(args.edited, topics) if args.edited else None
         raw, records = records[0], check_records(records, rig, topics.axis, quiet=args.json, masks=True)

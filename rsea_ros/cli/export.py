@@ -62,7 +62,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    target = next(name for name in TARGETS if getattr(args, name))
+    target = next(name for name in TARGETS if getattr(args, name) is not None)
     source = getattr(args, target)
     rig = load_rig(source)
     rig = rig.with_effects(*rig.effects, *(parse_effect(text) for text in args.effect))

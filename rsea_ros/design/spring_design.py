@@ -126,6 +126,8 @@ def least_for_band(requirement: Requirement, unit: MotorGear) -> float:
     low, high = 1.0, 2.0
     while not reaches(high):
         low, high = high, 2.0 * high
+    while reaches(low) and low > _SOFTEST:
+        low, high = 0.5 * low, low
     return bisect(reaches, low, high, 24)
 
 
@@ -161,6 +163,8 @@ def rig_of(requirement: Requirement, unit: MotorGear, stiffness: float) -> Rig:
     )
 
 
+_SOFTEST = 1e-9
+"""N m/rad: softer than any spring."""
 _STEPS = 201
 
 

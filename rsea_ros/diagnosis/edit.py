@@ -9,36 +9,44 @@ every value fitted and no cause.
 
 from __future__ import annotations
 
+import numpy as np
+
+from rsea_ros.checks.carried import check_diagnosable, require_motion
+from rsea_ros.checks.faults import check
 from rsea_ros.diagnosis.result import Diagnosis, Edit
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.prediction_errors import predict
 from rsea_ros.model.rig import Rig
-from rsea_ros.records.record import Record
+from rsea_ros.records.record import UNITS, Record
 
 
 def edited(diagnosis: Diagnosis, record: Record, cause: str) -> Edit:
-    """Return the errors of a diagnosis on a run of the edited machine.
+    """Return the errors of a diagnosis on a run of the edited machine, faulty samples left out.
 
-    record: as `predict` takes it. cause: that the edit has taken out. Raises ParameterError where the
-    diagnosis has not named it, or the run lacks the channel that the diagnosis speaks of.
+    cause: that the edit has taken out. Raises ParameterError where the diagnosis has not named it, or the
+    run lacks the channel that it was seen in, IdentificationError for a run that cannot be diagnosed.
     """
     names = [c.name for c in diagnosis.causes]
     if cause not in names:
         found = f"one of {', '.join(names)}" if names else "a diagnosis that names one"
-        raise ParameterError(f"--without-cause {cause}: not named by this diagnosis, expected {found}")
+        raise ParameterError(f"without cause {cause}: not named by this diagnosis, expected {found}")
+    check_diagnosable(record)
+    require_motion(record)
     channel = next(c.channel for c in diagnosis.causes if c.name == cause)
     extended = diagnosis.extended_rig
     without = extended.with_effects(*(e for e in extended.effects if e.name != cause))
+    checked = check(record, extended)
 
     def error(rig: Rig) -> float:
-        compared = predict(record, rig)
-        if channel not in compared:
-            raise ParameterError(
-                f"{record.source}: no {channel}, expected the channel that {cause} was seen in"
-            )
-        return compared[channel].rms_error
+        seen = predict(checked.record, rig).get(channel)
+        masked = checked.masked.get(channel, np.zeros(0, bool))
+        counts = seen is not None and seen.counts & ~(masked if len(masked) == len(seen.t) else False)
+        if seen is None or not np.any(counts):
+            raise ParameterError(f"{record.source}: no {channel} to compare, and {cause} was seen in it")
+        return float(np.sqrt(np.mean((seen.predicted - seen.measured)[counts] ** 2)))
 
     return Edit(
-        cause, channel, diagnosis.noise_rms[channel], error(extended), error(without),
-        error(diagnosis.baseline_rig), diagnosis.extended_residual_rms[channel],
+        cause, record.source, channel, UNITS[channel], diagnosis.noise_rms[channel], error(extended),
+        error(without), error(diagnosis.baseline_rig), diagnosis.extended_residual_rms[channel],
+        checked.faults,
     )  # fmt: skip

@@ -145,27 +145,45 @@ class Experiment:
     excitation: Mapping[str, float | str] = field(default_factory=dict)
 
 
+EditOutcome = Literal["survived", "still_there", "worse", "undecided"]
+"""survived: without the cause, the model predicts the edited machine as well as its own, and better than with
+it. still_there: with the cause it does. worse: better without it, yet not as well: name or size are wrong, or
+more was changed. undecided: neither, and no better without it: another machine, or more was changed.
+"""
+
+
 @dataclass(frozen=True)
 class Edit:
     """RMS errors of predictions of a run of the edited machine, in the unit of `channel`.
 
     error_before: of the extended model; error_after: with `cause` deleted and nothing fitted;
     error_dense_fit: of the rig with every value fitted and no cause. own_error: of the extended model on
-    held-out data of its own machine.
+    held-out data of its own machine. source, faults: of the run.
     """
 
     cause: str
+    source: str
     channel: str
+    unit: str
     noise: float
     error_before: float
     error_after: float
     error_dense_fit: float
     own_error: float
+    faults: tuple[Fault, ...] = ()
+
+    @property
+    def outcome(self) -> EditOutcome:
+        """What the run says of the name."""
+        enough = SAME * self.own_error
+        if self.error_after < self.error_before:
+            return "survived" if self.error_after <= enough else "worse"
+        return "still_there" if self.error_before <= enough else "undecided"
 
     @property
     def survived(self) -> bool:
-        """Whether the name survives: without the cause, no worse than on its own machine, and better."""
-        return self.error_after <= SAME * self.own_error and self.error_after < self.error_before
+        """Whether the name survives its removal."""
+        return self.outcome == "survived"
 
 
 SAME = 1.2

@@ -15,6 +15,8 @@ from rsea_ros.records.record import FloatArray
 
 TURN = 2.0 * math.pi
 CLOCK, CLOCK_RATE = "clock", "clock_rate"
+CLOCK_REACH = 3.0
+"""Sigmas that a fit may move a clock."""
 RATE_DOUBT, FASTEST = 50.0, 500.0
 """ppm, one sigma and bound. How much faster the clock of a sensor may run: cheap crystals differ by 100."""
 
@@ -192,7 +194,10 @@ def idle(effect: Effect, rig: Rig) -> frozenset[str]:
 def clocks(channels: Iterable[str], rig: Rig) -> tuple[Unknown, ...]:
     """Return the clock errors of sensors, s: measured later than stamped when positive."""
     doubts = {c: rig.clock_doubt(c) for c in channels if c != "motor_torque"}
-    return tuple(Unknown(f"{CLOCK}.{c}", 0.0, "s", -3.0 * d, 3.0 * d, False, d, d) for c, d in doubts.items())
+    return tuple(
+        Unknown(f"{CLOCK}.{c}", 0.0, "s", -CLOCK_REACH * d, CLOCK_REACH * d, False, d, d)
+        for c, d in doubts.items()
+    )
 
 
 def clock_rates(channels: Iterable[str]) -> tuple[Unknown, ...]:

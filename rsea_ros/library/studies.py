@@ -42,7 +42,7 @@ def law(data: Record | Sequence[Record], rig: Rig | str, *, progress: Progress |
     """Find laws of few terms for the residual that a rig leaves in records and no effect explains.
 
     data, rig, progress: as `diagnose` takes them; rig: best that of a diagnosis. The result has no `laws`
-    where nothing helps on held-out blocks; each has its equation, parameters and the text of an effect file.
+    where nothing helps on held-out blocks; each has its parameters, and the text of an effect file.
     Raises IdentificationError for records that are too short or lack a channel. Method: docs/laws.md.
     """
     from rsea_ros.checks.carried import check_diagnosable, with_check_faults
@@ -104,4 +104,6 @@ def design(*, stiffness: float | None = None, unit: str = UNIT, **demands: float
                 f"demand {quote(name)}{did_you_mean(name, known)}, expected one of {', '.join(known)}"
             )
     requirement, motor = Requirement(**demands), unit_named(unit, None)
-    return spring_design(requirement, motor, stiffness or least_stiffness(requirement, motor))
+    if stiffness is None:
+        stiffness = least_stiffness(requirement, motor)
+    return spring_design(requirement, motor, stiffness)

@@ -117,7 +117,7 @@ SENSOR = (
     Key("zero_unknown", "true or false", "false", "the zero differs from record to record"),
     Key("clock", "{value: …, unit: s}, below 0.01 s", "0 s", "delay of the reading after its stamp"),
     Key("clock_rate", "{value: …, unit: ppm}, below 1000 ppm", "0 ppm", "growth of that delay with time"),
-    Key("delay", "{value: …, unit: s}, 0 to 0.2 s", "0 s", "age of the reading at its stamp, known"),
+    Key("delay", "{value: …, unit: s}, from 0, below 0.2 s", "0 s", "age of the reading at its stamp, known"),
 )
 CLOCK = (
     Key("value", "number", NEEDED),

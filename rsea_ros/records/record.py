@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copyreg
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -25,6 +26,14 @@ NONSENSE = 10.0
 """Times its limit from which on a torque is no large one but an error: N mm for N m is 1000 times it."""
 HUGE = 1e6
 """N m, rad, rad/s, of no actuator: what is beyond was not measured, where no limit is known."""
+
+
+def frozen(mapping: Mapping[Any, Any]) -> MappingProxyType[Any, Any]:
+    """Return a mapping that cannot be changed; it goes to other processes as rigs and records do."""
+    return MappingProxyType(mapping)
+
+
+copyreg.pickle(MappingProxyType, lambda mapping: (frozen, (dict(mapping),)))
 
 
 def is_measured(value: float | None, most: float = math.inf) -> bool:

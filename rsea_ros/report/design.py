@@ -62,12 +62,17 @@ def _blocks(asked: SpringDesign, least: SpringDesign, robust: SpringDesign | Non
     yield margins_table(asked if robust is None else robust)
 
 
+def whole(value: float) -> str:
+    """Return a number without decimals where three digits remain, `461`, `1728`, `0.3`."""
+    return f"{value:.0f}" if value >= 10.0 else f"{value:.3g}"
+
+
 def verdict(d: SpringDesign) -> str:
     """Return in a sentence which demands the design meets."""
     unmet = sum(not c.met for c in d.checks)
-    spring = f"{d.stiffness:.0f} N·m/rad"
+    spring = f"{whole(d.stiffness)} N·m/rad"
     if not unmet:
-        turned = f"{math.degrees(d.deflection):.1f}° at {d.requirement.torque:.0f} N·m"
+        turned = f"{math.degrees(d.deflection):.1f}° at {whole(d.requirement.torque)} N·m"
         return f"{spring} meet every demand: {_hz(d.band_exact)}, {turned}"
     return f"{spring} reach {d.band_eq_7:.1f} Hz by Eq. (7), but miss {unmet} of {len(d.checks)} demands"
 

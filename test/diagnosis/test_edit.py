@@ -11,6 +11,7 @@ import pytest
 import rsea_ros as rsea
 from rsea_ros.cli.main import main
 from rsea_ros.diagnosis.edit import edited
+from rsea_ros.records.record import Channel
 
 SOUND = rsea.load_rig("paper_high_impedance").with_values(
     {"spring.stiffness": 1480.0, "rotor.reflected_damping": 25.0}
@@ -46,15 +47,25 @@ def test_the_right_name_survives_its_removal_and_bent_values_do_not(diagnosis):
 
 
 def test_a_name_that_was_not_taken_out_or_is_wrong_does_not_survive(diagnosis):
-    assert not edited(diagnosis, run(RUBBING, 2), "coulomb_friction").survived, "the machine is as it was"
+    assert edited(diagnosis, run(RUBBING, 2), "coulomb_friction").outcome == "still_there"
+    stiffer = SOUND.with_values({"spring.stiffness": 2000.0})
+    assert edited(diagnosis, run(stiffer, 2), "coulomb_friction").outcome in ("worse", "undecided")
     wrong = diagnosis.baseline_rig.with_effect("coulomb_friction", torque=1.0)
     assert not edited(
         SimpleNamespace(**{**vars(diagnosis), "extended_rig": wrong}), run(SOUND, 2), "coulomb_friction"
     ).survived
     with pytest.raises(
-        rsea.RseaError, match="--without-cause backlash: not named by this diagnosis, expected one of"
+        rsea.RseaError, match="without cause backlash: not named by this diagnosis, expected one of"
     ):
         edited(diagnosis, run(SOUND, 2), "backlash")
+
+
+def test_faulty_samples_of_the_edited_run_do_not_count(diagnosis):
+    """Four spikes of 80 N·m made "does not survive" of a machine that was right."""
+    sound = run(SOUND, 2)
+    spikes = sound["ft"].y + 80.0 * np.isin(np.arange(len(sound["ft"])), (300, 900, 1500, 2200))
+    edit = edited(diagnosis, sound.with_channels(ft=Channel(sound["ft"].t, spikes)), "coulomb_friction")
+    assert edit.survived and "outliers" in {fault.kind for fault in edit.faults}
 
 
 def test_the_verb_writes_the_edit_and_keeps_its_results_where_the_cause_is_another(tmp_path, capsys):
@@ -66,5 +77,7 @@ def test_the_verb_writes_the_edit_and_keeps_its_results_where_the_cause_is_anoth
     assert "Coulomb friction survives its removal" in " ".join(capsys.readouterr().out.split())
     told = json.loads((tmp_path / "out" / "diagnosis.json").read_text())["edit"]
     assert told["cause"] == "coulomb_friction" and told["error_after"] < told["error_dense_fit"]
+    assert told["outcome"] == "survived" and told["unit"] == "N m"
+    assert main([*words[:2], "--edited", "", "--without-cause", "coulomb_friction"]) == 2
     assert main(words) == 2
     assert "--edited BAG and --without-cause EFFECT: one is given" in capsys.readouterr().err

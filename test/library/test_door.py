@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import pickle
 import subprocess
 import sys
 from types import SimpleNamespace
@@ -201,6 +202,8 @@ def test_what_is_saved_is_read_back(record, fit, tmp_path):
         assert rsea.predict(first, second)["ft"].rms_error < 0.04, "in any order: N·m, the noise is 0.03"
     with pytest.raises(rsea.RseaError, match=r"model\.yaml"):
         fit.save(tmp_path / "model.yaml")
+    other = pickle.loads(pickle.dumps((again, there)))
+    assert rsea.predict(*other)["ft"].rms_error == rsea.predict(again, there)["ft"].rms_error, "processes"
 
 
 def test_the_studies_answer_as_the_verbs_do(record):
@@ -208,6 +211,10 @@ def test_the_studies_answer_as_the_verbs_do(record):
     wanted = rsea.design(torque=40.0, bandwidth=12.0)
     assert wanted.feasible and wanted.stiffness == pytest.approx(460.7, abs=0.1), "5 deg at 40 N·m, Eq. (8)"
     assert not rsea.design(torque=40.0, bandwidth=12.0, stiffness=260.0).feasible
+    tiny = rsea.design(torque=0.02, bandwidth=0.5, inertia=1e-6)
+    assert tiny.feasible and tiny.stiffness == pytest.approx(0.23, abs=0.01), "was 1: the search began there"
+    with pytest.raises(ParameterError, match="stiffness = 0"):
+        rsea.design(stiffness=0.0)
     with pytest.raises(ParameterError, match="demand 'torqe', did you mean torque"):
         rsea.design(torqe=40.0)
     rig = rsea.load_rig("paper_high_impedance")

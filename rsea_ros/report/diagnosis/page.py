@@ -10,6 +10,7 @@ from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings
 from rsea_ros.documents.wording import list_names
 from rsea_ros.identification.result import Overlay
 from rsea_ros.identification.settings import Setting
+from rsea_ros.identification.unknowns import CLOCK, CLOCK_REACH
 from rsea_ros.model.rig_file import rig_text
 from rsea_ros.outputs.new_files import Destination, NewFiles
 from rsea_ros.records.record import UNITS, Channel, Record
@@ -222,6 +223,8 @@ def diagnosis_json(diagnosis: Diagnosis) -> dict[str, Any]:
     d, numbers = diagnosis, {s.name: outputs.strict(s.value) for s in diagnosis.settings.numbers()}
     following, misfit = d.next_experiment, "what from=low to=high unit times_noise channel"
     stuck = {name for r in d.remarks if r.code == "at_bound" for name in r.names}
+    far = {p.name for p in d.final if abs(p.spreads_off) > 0.999 * CLOCK_REACH}
+    stuck |= {name for name in far if name.startswith(f"{CLOCK}.")}
     others = [
         {**pick(a, "name instead_of probability channel"), "parameters": _sizes(a),
          "gain": pick(a, "holdout=gain_holdout holdout_ci95=gain_holdout_ci95")}
@@ -258,7 +261,10 @@ def diagnosis_json(diagnosis: Diagnosis) -> dict[str, Any]:
             for p in d.final if p.value != p.start
         ],
         "why_stopped": d.why_stopped,
-        "edit": d.edit and {**vars(d.edit), "survived": d.edit.survived},
+        "edit": d.edit and {
+            **vars(d.edit), "outcome": d.edit.outcome, "survived": d.edit.survived,
+            "faults": [outputs.fault_json(f) for f in d.edit.faults],
+        },
         "next_experiment": following and {"why": say.next_run(following), **pick(following, "excitation")},
         "statements": list(remarks.remark_sentences(d.remarks)),
         "settings": {**pick(d.settings, "max_causes without"), **numbers},

@@ -308,15 +308,22 @@ def inspection(name: str) -> str:
     return effect_named(name).inspect if name in catalogue() else ""
 
 
+_EDITED = {
+    "survived": "survives its removal",
+    "still_there": "is still in the edited machine",
+    "worse": "does not survive its removal, or more was changed",
+    "undecided": "cannot be judged: something else differs, or this is another machine",
+}
+
+
 def edit_sentence(e: results.Edit) -> str:
     """Return what a run of the edited machine says of a name."""
     errors = (e.error_after, e.error_before, e.error_dense_fit, e.own_error)
     after, before, dense, own = (words.times(error / e.noise) for error in errors)
-    verdict = "survives" if e.survived else "does not survive"
     return (
-        f"{words.effect(e.cause)} {verdict} its removal: deleted from the model and nothing fitted, the "
-        f"{words.channel(e.channel)} of the edited machine is predicted within {after} times the noise "
-        f"({own} on its own machine); with it {before}, by the rig fitted without causes {dense}"
+        f"{words.effect(e.cause)} {_EDITED[e.outcome]}. Deleted from the model, nothing fitted, the error of "
+        f"the {words.channel(e.channel)} of the edited machine is {after} times the noise ({own} on its own "
+        f"machine); with it {before}, of the rig fitted without causes {dense}"
     )
 
 
