@@ -22,7 +22,8 @@ def test_the_python_of_the_readme_runs_and_names_the_cause(capsys):
     assert abs(float(gap) - 4e-3) < 1e-4
 
 
-def test_the_tutorial_runs_and_finds_the_play(capsys):
+def test_the_tutorial_runs_and_finds_the_play(capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     blocks = re.findall(r"```python\n(.*?)```", (DOCS / "tutorial.md").read_text(), flags=re.DOTALL)
     names: dict[str, object] = {}
     for block in blocks:
