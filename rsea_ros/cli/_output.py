@@ -21,11 +21,17 @@ class Action(NamedTuple):
     run: Callable[[argparse.Namespace], int]
 
 
-def add_actions(parser: argparse.ArgumentParser, actions: Mapping[str, Action]) -> None:
-    """Declare the actions of a verb; the chosen one becomes `args.action`."""
-    added = parser.add_subparsers(dest="action", required=True, metavar="|".join(actions))
-    for name, action in actions.items():
-        action.add(added.add_parser(name, help=action.help, description=action.help))
+def verb_of(
+    actions: Mapping[str, Action],
+) -> tuple[Callable[[argparse.ArgumentParser], None], Callable[[argparse.Namespace], int]]:
+    """Return `add_arguments` and `run` of a verb with these actions."""
+
+    def add_arguments(parser: argparse.ArgumentParser) -> None:
+        added = parser.add_subparsers(dest="action", required=True, metavar="|".join(actions))
+        for name, action in actions.items():
+            action.add(added.add_parser(name, help=action.help, description=action.help))
+
+    return add_arguments, lambda args: actions[args.action].run(args)
 
 
 FOUND = 1

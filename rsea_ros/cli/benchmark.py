@@ -17,7 +17,7 @@ from typing import Any
 
 from rsea_ros.benchmark import scoring
 from rsea_ros.benchmark.dataset import Answer, Dataset, read_answers, read_dataset, read_text
-from rsea_ros.cli._output import Action, add_actions, add_force, path
+from rsea_ros.cli._output import Action, add_force, path, verb_of
 from rsea_ros.cli._terminal import columns, positive, progress, say, whole_number
 from rsea_ros.errors import BenchmarkError, ParameterError, RseaError
 from rsea_ros.model.rig_file import load_rig
@@ -32,14 +32,6 @@ SHORTEST, MOST = 16, 9999
 HEAD = (
     "entry", "named right, %", "false names, %", "silent if none, %", "Brier", "median rank", "answered, %",
 )  # fmt: skip
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    add_actions(parser, ACTIONS)
-
-
-def run(args: argparse.Namespace) -> int:
-    return ACTIONS[args.action].run(args)
 
 
 def _add_make(parser: argparse.ArgumentParser) -> None:
@@ -181,3 +173,4 @@ ACTIONS = {
     "run": Action("answer a data set by this project", _add_run, _run),
     "score": Action("score answers against the truth", _add_score, _score),
 }
+add_arguments, run = verb_of(ACTIONS)

@@ -15,7 +15,7 @@ from pathlib import Path
 from shlex import quote
 from typing import Any, get_args
 
-from rsea_ros.cli._output import FOUND, Action, add_actions, add_fail_on, add_force, results_place
+from rsea_ros.cli._output import FOUND, Action, add_fail_on, add_force, results_place, verb_of
 from rsea_ros.cli._terminal import columns, progress
 from rsea_ros.documents.wording import printable
 from rsea_ros.errors import ParameterError, RseaError
@@ -35,14 +35,6 @@ MOST_SHOWN = 10
 _FORMULA = ("=", "+", "-", "@", "\t", "\r")
 _WIDEST = 60
 """Largest width of a cell on a terminal, characters."""
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    add_actions(parser, ACTIONS)
-
-
-def run(args: argparse.Namespace) -> int:
-    return ACTIONS[args.action].run(args)
 
 
 def _add_work(parser: argparse.ArgumentParser) -> None:
@@ -294,3 +286,4 @@ ACTIONS = {
     "watch": Action("run at intervals and report changes", _add_watch, _watch),
     "sql": Action("query the store", _add_sql, _sql),
 }
+add_arguments, run = verb_of(ACTIONS)

@@ -99,26 +99,19 @@ def node_calls(graph: str, assignments: Sequence[str]) -> list[NodeCall]:
             f"graph {graph!r}, expected {list_names(names, 'or')}{did_you_mean(graph, names)}"
         )
     values = {name: default for name, (default, _) in arguments_of_graphs().items()}
-    values |= _parse_assignments(assignments)
+    for assignment in assignments:
+        name, sign, value = assignment.partition(":=")
+        if not sign:
+            raise ParameterError(f"argument {assignment!r}, expected NAME:=VALUE")
+        if name not in values:
+            near = did_you_mean(name, values)
+            raise ParameterError(f"argument {name!r}, expected one of {', '.join(values)}{near}")
+        values[name] = value
     content = _graph()
     first = content["graphs"][graph]
     chosen = {first: content["first"][first]}
     chosen |= {name: settings for name, settings in content["others"].items() if _is_true(name, values[name])}
     return [_call(name, settings, values) for name, settings in chosen.items()]
-
-
-def _parse_assignments(assignments: Sequence[str]) -> dict[str, str]:
-    known = arguments_of_graphs()
-    given: dict[str, str] = {}
-    for assignment in assignments:
-        name, sign, value = assignment.partition(":=")
-        if not sign:
-            raise ParameterError(f"argument {assignment!r}, expected NAME:=VALUE")
-        if name not in known:
-            near = did_you_mean(name, known)
-            raise ParameterError(f"argument {name!r}, expected one of {', '.join(known)}{near}")
-        given[name] = value
-    return given
 
 
 def _call(name: str, settings: Mapping[str, str], values: Mapping[str, str]) -> NodeCall:

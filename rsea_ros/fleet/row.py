@@ -1,7 +1,7 @@
 """The row of a recording and a joint, the Parquet files of rows, and their compaction.
 
 The column `joint` is in the path of the file (joint=NAME/month=YYYY-MM), as every reader of partitioned
-Parquet expects; its month is that of `time`.
+Parquet expects; its month is that of `time`, in UTC, or `unknown`.
 
 A compacted file lists those that it replaces; it gets its name before they are removed. A kill in between
 leaves rows twice, which every reader of this package counts once, until the next run removes the old files.
@@ -11,7 +11,6 @@ import hashlib
 import json
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
 
@@ -27,8 +26,6 @@ from pyarrow import parquet  # noqa: E402
 SCHEMA = 1
 """Grows when a column changes its meaning; a store of a higher one is not read."""
 Row = dict[str, Any]
-UNDATED = "unknown"
-"""Month of a recording whose time is not known."""
 
 
 def _list_of(*fields: tuple[str, pa.DataType]) -> pa.DataType:
@@ -83,11 +80,6 @@ def analysis_of(model_version: str, settings: str) -> str:
 def key_of(joint: str, recording: str, model_version: str, settings: str) -> str:
     """Return the unique key of a row: joint, recording, and hash of software and settings."""
     return f"{joint}/{recording}-{analysis_of(model_version, settings)}"
-
-
-def month_of(time: datetime | None) -> str:
-    """Return the month of a time as the store's folders say it."""
-    return UNDATED if time is None else time.astimezone(timezone.utc).strftime("%Y-%m")
 
 
 def write(rows: Sequence[Mapping[str, Any]], path: Path) -> None:

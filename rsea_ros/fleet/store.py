@@ -19,7 +19,7 @@ from datetime import datetime, timezone
 from pathlib import Path
 
 from rsea_ros.fleet import FleetError, row as of_row
-from rsea_ros.fleet.row import SCHEMA, Row, analysis_of, key_of, month_of
+from rsea_ros.fleet.row import SCHEMA, Row, analysis_of, key_of
 from rsea_ros.outputs.files import make_folder
 from rsea_ros.outputs.new_files import Destination, NewFiles, write_file
 
@@ -76,7 +76,8 @@ class Store:
             with NewFiles(Destination(self.path / row["artefacts"], force=True)) as new:
                 for file, content in outcome.files.items():
                     new.write(file, content)
-        folder = self.rows / f"joint={row['joint']}" / f"month={month_of(row['time'])}"
+        month = row["time"].astimezone(timezone.utc).strftime("%Y-%m") if row["time"] else "unknown"
+        folder = self.rows / f"joint={row['joint']}" / f"month={month}"
         with NewFiles(folder) as new:
             of_row.write([row], new.stage(f"{name}.parquet"))
         self._loose[folder] += 1

@@ -40,8 +40,10 @@ class Regression:
             np.maximum(np.sum(self.w[:, None] * self.x**2, axis=0) + self.precision, 1e-300)
         )
         normal = (self.x * scale).T @ (self.w[:, None] * self.x * scale) + np.diag(self.precision * scale**2)
-        inverse = np.linalg.pinv(normal, rcond=_DEPENDENT, hermitian=True)
-        return np.asarray(inverse * np.outer(scale, scale))
+        size, axes = np.linalg.eigh(normal)
+        known = size > _DEPENDENT * size[-1]
+        axes = scale[:, None] * axes[:, known]
+        return np.asarray(axes / size[known] @ axes.T)
 
     @cached_property
     def coefficients(self) -> FloatArray:
