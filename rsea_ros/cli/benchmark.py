@@ -4,6 +4,8 @@
 project, `score` holds answers against the truth, beside answers that need no skill.
 """
 
+from __future__ import annotations
+
 import argparse
 import json
 import math
@@ -13,9 +15,8 @@ from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
 from shlex import quote
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from rsea_ros.benchmark import scoring
 from rsea_ros.benchmark.dataset import Answer, Dataset, read_answers, read_dataset, read_text
 from rsea_ros.cli._output import Action, add_force, path, verb_of
 from rsea_ros.cli._terminal import columns, positive, progress, say, whole_number
@@ -23,6 +24,9 @@ from rsea_ros.errors import BenchmarkError, ParameterError, RseaError
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.outputs.new_files import check_free, write_file
 from rsea_ros.progress import Progress
+
+if TYPE_CHECKING:
+    from rsea_ros.benchmark import scoring
 
 HELP = "name hidden causes: make records of known truth, answer them, score answers (make, run, score)"
 EXAMPLE = "rsea benchmark make records --seed 1 && rsea benchmark run records --out answers.jsonl"
@@ -117,10 +121,12 @@ def _kept_answers(records: Dataset, entry: str, partial: Path) -> dict[str, dict
 
 def _answer(records: Dataset, entry: str, name: str) -> dict[str, Any]:
     """Return the answer to a record; one that cannot be diagnosed names no effect."""
+    from rsea_ros.benchmark.scoring import ENTRIES
+
     record, rig = records.record(name), load_rig(records.rig_path(name))
     start, failure = time.monotonic(), {}
     try:
-        answer = scoring.ENTRIES[entry](record, rig)
+        answer = ENTRIES[entry](record, rig)
     except RseaError as error:
         answer, failure = Answer(), {"error": str(error)}
     seconds = round(time.monotonic() - start, 2)
@@ -135,6 +141,8 @@ def _add_score(parser: argparse.ArgumentParser) -> None:
 
 
 def _score(args: argparse.Namespace) -> int:
+    from rsea_ros.benchmark import scoring
+
     records = read_dataset(args.dataset)
     truths = scoring.read_truth(args.truth or records.truth, records)
     entries = {name: make(records) for name, make in scoring.BASELINES.items()}

@@ -1,29 +1,29 @@
 """`rsea check`: a traffic light for each property that a fit needs of a record."""
 
+from __future__ import annotations
+
 import argparse
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 
 from msg_adapters import TopicMap, read_record
 from msg_adapters.topic_map import AXES
-from rsea_ros.checks import check as one_record
-from rsea_ros.checks.carried import note_unused, require_motion, with_faults
-from rsea_ros.checks.finding import LIGHTS, Findings, unused_sentence, worst
 from rsea_ros.cli import _terminal
 from rsea_ros.cli._output import FOUND, add_force, path, provenance, results_place
 from rsea_ros.cli._topics import add_runs, add_topic_options, cut, rig_choice, topic_map
 from rsea_ros.errors import RseaError
-from rsea_ros.model.extent import check_pace
-from rsea_ros.model.inverse import is_inverse, require_position
-from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.records.record import Channel, Record
-from rsea_ros.report.check import check_json, check_lines, summary, warnings, write_check
 from rsea_ros.report.result_files import CHECK
+
+if TYPE_CHECKING:
+    from rsea_ros.checks.finding import Findings
+    from rsea_ros.model.rig import Rig
 
 HELP = "check topics, rates, clocks, noise, sign, scale and rig of a record in seconds"
 EXAMPLE = "rsea check run.mcap --rig my_bench.yaml"
@@ -40,6 +40,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
+    from rsea_ros.checks.check import check_record
+    from rsea_ros.checks.finding import LIGHTS, worst
+    from rsea_ros.report import check as page
+
     rig, topics = load_rig(args.rig), topic_map(args)
     place = results_place(args, args.out, CHECK, [*args.bags, args.rig]) if args.out else None
     records = [cut(read_record([bag], topics=topics, strict=False), args) for bag in args.bags]
@@ -47,12 +51,12 @@ def run(args: argparse.Namespace) -> int:
     checks = []
     for bag, record in zip(args.bags, records, strict=True):
         others = partial(other_axes, bag, topics, args)
-        found = one_record.check_record(record, rig, topics.axis, others, values=True)
+        found = check_record(record, rig, topics.axis, others, values=True)
         checks.append(replace(found, rig_choice=rig_choice(args)))
     if place:
-        report = write_check(checks, records, place, provenance("check", args.bags, args.rig))
+        report = page.write_check(checks, records, place, provenance("check", args.bags, args.rig))
     if args.json:
-        print(json.dumps(check_json(checks), indent=1, allow_nan=False, ensure_ascii=False))
+        print(json.dumps(page.check_json(checks), indent=1, allow_nan=False, ensure_ascii=False))
     else:
         _print(checks)
         if place:
@@ -76,6 +80,8 @@ def other_axes(bag: str, topics: TopicMap, args: argparse.Namespace) -> Mapping[
 
 
 def _print(checks: list[Findings]) -> None:
+    from rsea_ros.report.check import check_lines, summary
+
     console = Console()
     for findings in checks:
         print(findings.source)
@@ -92,12 +98,19 @@ def check_records(
     Prints a line for each warning unless quiet. masks: see with_faults.
     Raises IdentificationError if nothing moves, or a position is lacking that the rig is judged by.
     """
+    from rsea_ros.checks.carried import note_unused, require_motion, with_faults
+    from rsea_ros.checks.check import check_record
+    from rsea_ros.checks.finding import unused_sentence
+    from rsea_ros.model.extent import check_pace
+    from rsea_ros.model.inverse import is_inverse, require_position
+    from rsea_ros.report.check import warnings
+
     for record in records:
         check_pace(record)
         require_motion(record)
         if is_inverse(rig):
             require_position(record)
-    checks = [one_record.check_record(record, rig, axis) for record in records]
+    checks = [check_record(record, rig, axis) for record in records]
     lines = dict.fromkeys(line for findings in checks for line in warnings(findings))
     if lines and not quiet:
         print(f"compared with rig {rig.name}:")

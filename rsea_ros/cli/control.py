@@ -1,7 +1,10 @@
 """`rsea control`: gains of the torque controller for a rig, their margins, and the resulting performance."""
 
+from __future__ import annotations
+
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.table import Table
@@ -9,15 +12,15 @@ from rich.table import Table
 from rsea_ros.cli._output import add_json, add_results, print_file, provenance, results_place
 from rsea_ros.cli._terminal import progress
 from rsea_ros.cli._topics import RIG
-from rsea_ros.control.study import MotorLimits, Study, study
-from rsea_ros.control.uncertainty import lightest
 from rsea_ros.design.motor_gear_units import catalogue
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.rig import Rig, motor_torque
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.outputs.new_files import NewFiles
-from rsea_ros.report import control as page
 from rsea_ros.report.result_files import CONTROL_JSON, REPORT, json_text
+
+if TYPE_CHECKING:
+    from rsea_ros.control.study import MotorLimits, Study
 
 HELP = "design the torque controller of a rig: gains, margins, trials in simulation, output impedance"
 EXAMPLE = "rsea control paper_high_impedance --rate 280"
@@ -38,6 +41,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
+    from rsea_ros.control.study import study
+    from rsea_ros.control.uncertainty import lightest
+    from rsea_ros.report import control as page
+
     place = results_place(args, "out/control", (CONTROL_JSON, REPORT), [args.rig, args.free])
     for rate in args.rate:
         if not SLOWEST <= rate <= FASTEST:
@@ -59,6 +66,8 @@ def run(args: argparse.Namespace) -> int:
 
 def motors(rig: Rig) -> list[MotorLimits]:
     """Return the limit of the driver, and those of the catalogue unit with the gear ratio of the rig."""
+    from rsea_ros.control.study import MotorLimits
+
     limit, where = motor_torque(rig)
     limits = [MotorLimits("driver's limit", limit, float("inf"), where)]
     for unit in catalogue().values():
@@ -72,6 +81,8 @@ def motors(rig: Rig) -> list[MotorLimits]:
 
 
 def _print(result: Study, report: Path) -> None:
+    from rsea_ros.report import control as page
+
     console = Console()
     for line in page.gains_words(result):
         console.print(line, highlight=False)

@@ -8,12 +8,11 @@ from typing import Any
 from rsea_ros.cli import _output
 from rsea_ros.cli._output import path
 from rsea_ros.cli._terminal import say
-from rsea_ros.design import spring_design as springs
 from rsea_ros.design.mechanism import UNITS, Requirement
-from rsea_ros.design.motor_gear_units import unit_named
+from rsea_ros.design.motor_gear_units import PAPERS, unit_named
 from rsea_ros.model.train import TRAINS
 from rsea_ros.outputs.new_files import NewFiles
-from rsea_ros.report import design as page, words
+from rsea_ros.report import words
 from rsea_ros.report.result_files import DESIGN_JSON, REPORT, json_text
 
 HELP = "compute spring stiffness and spring rate from torque, bandwidth and inertia by the paper's method"
@@ -30,7 +29,7 @@ DEMANDS = {
     "tolerance_db": "tolerance of |T_d/T_p|, dB (default %(default)s)",
     "tolerance_deg": "tolerance of its phase, deg; 90: none (default %(default)s)",
 }
-UNIT, STIFFNESS = "rd85x13-hd_cpl-25a-160", 260.0
+STIFFNESS = 260.0
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -41,7 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         add(f"--{name.replace('_', '-')}", type=float, default=example[name], help=about)
     about = f"stiffness to test, N·m/rad (default: the least for your demands; the paper's: {STIFFNESS:g})"
     add("--stiffness", type=float, help=about)
-    add("--unit", default=UNIT, help="motor-gear unit of the catalogue (default %(default)s)")
+    add("--unit", default=PAPERS, help="motor-gear unit of the catalogue (default %(default)s)")
     add("--train", choices=TRAINS, help="gear train, if it differs from that of the unit")
     about = "YAML of motor-gear units (default config/design/motor_gear_units.yaml)"
     add("--catalogue", type=path, help=about)
@@ -51,6 +50,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
+    from rsea_ros.design import spring_design as springs
+    from rsea_ros.report import design as page
+
     place = _output.results_place(args, "out/design", (DESIGN_JSON, REPORT), [args.catalogue])
     values = {name: getattr(args, name) for name in DEMANDS}
     requirement = Requirement(**{**values, "deflection": math.radians(args.deflection)})
@@ -81,11 +83,14 @@ def unstated(d: Any) -> str:
     if "deflection" in values:
         values["deflection"] = math.degrees(d.requirement.deflection), "°"
     parts = [f"{name.replace('_', ' ')} {value:.3g} {unit}" for name, (value, unit) in values.items()]
-    return ", ".join([*parts, *(["motor and gear"] if d.unit.name == UNIT else [])])
+    return ", ".join([*parts, *(["motor and gear"] if d.unit.name == PAPERS else [])])
 
 
 def _print(asked: Any, least: Any, robust: Any, report: Path) -> None:
-    say(page.verdict(asked))
+    from rsea_ros.design.spring_design import by_train
+    from rsea_ros.report.design import verdict, whole
+
+    say(verdict(asked))
     for check in asked.checks:
         value = "not possible" if math.isnan(check.value) else f"{check.value:.4g} {words.unit(check.unit)}"
         sign = ">=" if check.least else "<="
@@ -95,11 +100,11 @@ def _print(asked: Any, least: Any, robust: Any, report: Path) -> None:
     if asked is least:
         say(f"no softer spring meets them: {rate}")
     else:
-        smallest = f"{page.whole(least.stiffness)} N·m/rad, {rate}"
+        smallest = f"{whole(least.stiffness)} N·m/rad, {rate}"
         say(f"smallest stiffness that meets all demands on the spring: {smallest}")
     if papers := unstated(asked):
         say(f"not stated, so the paper's: {papers}", indent=2)
-    for row in springs.by_train(asked.requirement, asked.unit, asked.stiffness):
+    for row in by_train(asked.requirement, asked.unit, asked.stiffness):
         low, high = row.band_range
         say(
             f"  {words.train(row.train)}, n = {row.turns:+.0f}: {row.band:.4g} Hz "

@@ -9,7 +9,6 @@ from rich.console import Console
 
 from msg_adapters import TopicMap, read_record
 from msg_adapters.records import write_overlay
-from rsea_ros.checks import carried
 from rsea_ros.cli import _output, _terminal, _topics
 from rsea_ros.cli.check import check_records
 from rsea_ros.diagnosis.result import Diagnosis, Verdict
@@ -59,8 +58,9 @@ def run(args: argparse.Namespace) -> int:
         runs = [*args.bags, *([args.holdout] if args.holdout else [])]
         _topics.each_once([*runs, *([args.edited] if args.edited else [])])
         records = [readable(bag, topics, args) for bag in runs]
-        changed = readable(args.edited, topics) if args.edited else None
+        records += [readable(args.edited, topics)] if args.edited else []
         raw, records = records[0], check_records(records, rig, topics.axis, quiet=args.json, masks=True)
+        changed = records.pop() if args.edited else None
         holdout = records.pop() if args.holdout else None
         # after the bags, so that a bad one is refused at once
         from rsea_ros.diagnosis.diagnose import diagnose
@@ -95,9 +95,11 @@ def readable(bag: str, topics: TopicMap, args: argparse.Namespace | None = None)
 
     Raises BagError or IdentificationError for a run that cannot be diagnosed.
     """
+    from rsea_ros.checks.carried import check_diagnosable
+
     record = bound_values(read_record([bag], topics=topics, strict=False))
     record = record if args is None else _topics.cut(record, args)
-    carried.check_diagnosable(record)
+    check_diagnosable(record)
     return record
 
 

@@ -1,9 +1,12 @@
 """`rsea experiment`: the run that separates the remaining causes."""
 
+from __future__ import annotations
+
 import argparse
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rsea_ros.cli import _output
 from rsea_ros.cli._terminal import positive, progress, say, whole_number
@@ -12,19 +15,17 @@ from rsea_ros.cli.diagnose import readable
 from rsea_ros.documents import strict_yaml
 from rsea_ros.documents.units import plain
 from rsea_ros.errors import FieldError, ParameterError
-from rsea_ros.experiment.advice import Advice, advise
-from rsea_ros.experiment.campaign import Rules
-from rsea_ros.experiment.hypothesis import NOTHING, Hypothesis
-from rsea_ros.experiment.joint_weighing import weigh
-from rsea_ros.experiment.proposal import DesignRequest
 from rsea_ros.experiment.run_shape import UNITS, limits_from, run_text
-from rsea_ros.experiment.stored_models import ModelFile, hypotheses_from, model_of, models_of
-from rsea_ros.identification.solver import Map, worker_pools
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.outputs.new_files import Destination, NewFiles
-from rsea_ros.report import experiment as page
 from rsea_ros.report.result_files import COMMANDS, EXPERIMENT, EXPERIMENT_JSON, MODEL, REPORT, json_text
 from rsea_ros.report.words import LABEL
+
+if TYPE_CHECKING:
+    from rsea_ros.experiment.advice import Advice
+    from rsea_ros.experiment.hypothesis import Hypothesis
+    from rsea_ros.experiment.stored_models import ModelFile
+    from rsea_ros.identification.solver import Map
 
 HELP = "design the run that separates the remaining causes, within the limits of a bench"
 EXAMPLE = "rsea experiment friction/model.yaml play/model.yaml --limits torque=20,velocity=1"
@@ -50,6 +51,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
+    from rsea_ros.experiment.advice import advise
+    from rsea_ros.experiment.proposal import DesignRequest
+    from rsea_ros.identification.solver import worker_pools
+
     place = _output.results_place(args, Path("out") / "experiment", EXPERIMENT, [*args.models, *args.bag])
     shortest = args.shortest or min(0.5, args.longest)
     asked = DesignRequest(limits_from(args.limits), args.rate, shortest, args.longest, refine=args.refine)
@@ -68,6 +73,8 @@ def run(args: argparse.Namespace) -> int:
 
 def models_in(path: str) -> list[ModelFile]:
     """Return the causes of a model.yaml, a rig, or a diagnosis.json beside its model.yaml."""
+    from rsea_ros.experiment.stored_models import model_of, models_of
+
     if Path(path).suffix != ".json":
         return [model_of(load_rig(path))]
     content = strict_yaml.read(Path(path)).content
@@ -88,9 +95,13 @@ def _possible(
 
     With bags, one more hypothesis is that there is no cause.
     """
+    from rsea_ros.experiment.campaign import Rules
+    from rsea_ros.experiment.hypothesis import NOTHING
+    from rsea_ros.experiment.joint_weighing import weigh
+    from rsea_ros.experiment.stored_models import hypotheses_from
+
     if not args.bag:
         return hypotheses_from(models), {}, {}
-
     first = models[0].rig
     rig = first.with_effects(*(e for e in first.effects if e.name != models[0].name))
     records = [readable(bag, topic_map(args)) for bag in args.bag]
@@ -102,15 +113,19 @@ def _possible(
 
 
 def write_advice(advice: Advice, place: Destination, args: argparse.Namespace) -> Path:
+    from rsea_ros.report.experiment import advice_json, advice_page
+
     source = _output.provenance("experiment", args.bag)
     with NewFiles(place) as new:
         if advice.proposal is not None:
             new.write(COMMANDS, run_text(advice.proposal.command, advice.proposal.rate))
-        new.write(EXPERIMENT_JSON, json_text(page.advice_json(advice), source))
-        return new.write(REPORT, page.advice_page(advice, source))
+        new.write(EXPERIMENT_JSON, json_text(advice_json(advice), source))
+        return new.write(REPORT, advice_page(advice, source))
 
 
 def _print(advice: Advice, report: Path) -> None:
+    from rsea_ros.report import experiment as page
+
     say(page.verdict(advice))
     for name, sure in page.possible_rows(advice):
         say(f"cause       {name}: {sure}", indent=LABEL)

@@ -1,5 +1,7 @@
 """`rsea export`: a rig as a model of another program, and the parts that it cannot express."""
 
+from __future__ import annotations
+
 import argparse
 import json
 import math
@@ -7,23 +9,23 @@ from collections.abc import Mapping
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rsea_ros.cli._output import FOUND, add_force, path, provenance
 from rsea_ros.cli._terminal import positive, say
-from rsea_ros.cli.simulate import parse_effect
 from rsea_ros.documents.strict_yaml import load
 from rsea_ros.documents.units import plain
 from rsea_ros.errors import FieldError, ParameterError, RigError
-from rsea_ros.exports.others import Export, coverage_lines
-from rsea_ros.exports.verification import RATE, Difference, Verification, verify
-from rsea_ros.identification.excitation import JOINT, ExcitationSettings, excitation
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_document import check_effects
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.outputs.new_files import Destination, NewFiles, check_free, write_file
 from rsea_ros.records.record import FloatArray
 from rsea_ros.report.result_files import DIAGNOSIS_JSON, MODEL, pick
+
+if TYPE_CHECKING:
+    from rsea_ros.exports.others import Export
+    from rsea_ros.exports.verification import Difference, Verification
 
 HELP = "convert a rig to MuJoCo, FMI, URDF, SDF, Isaac Lab, BAM or C; list the parts left out"
 EXAMPLE = "rsea export --mjcf paper_high_impedance --out bench.xml"
@@ -62,6 +64,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
+    from rsea_ros.cli.simulate import parse_effect
+
     target = next(name for name in TARGETS if getattr(args, name) is not None)
     source = getattr(args, target)
     rig = load_rig(source)
@@ -132,6 +136,8 @@ def _measured(source: str, rig: Rig) -> dict[str, Any]:
 
 def _verification(made: Export, rig: Rig, args: argparse.Namespace) -> Verification:
     """Return the verification. Raises ParameterError if --limit needs a play and there is none."""
+    from rsea_ros.exports.verification import Verification, verify
+
     verified = Verification(not_played="--no-play")
     if not args.no_play:
         verified = verify(made, rig, _chirp(rig, args))
@@ -141,6 +147,9 @@ def _verification(made: Export, rig: Rig, args: argparse.Namespace) -> Verificat
 
 
 def _chirp(rig: Rig, args: argparse.Namespace) -> FloatArray:
+    from rsea_ros.exports.verification import RATE
+    from rsea_ros.identification.excitation import JOINT, ExcitationSettings, excitation
+
     default = JOINT if rig.loop else ExcitationSettings(amplitude=10.0, noise=2.0, high=60.0)
     size = args.amplitude or default.amplitude
     noise = default.noise * size / default.amplitude
@@ -151,6 +160,8 @@ def _chirp(rig: Rig, args: argparse.Namespace) -> FloatArray:
 
 def _lines(made: Export, rig: Rig, out: Path, verified: Verification) -> list[str]:
     """Return the report as text: file, content, omissions and what they cost, differences."""
+    from rsea_ros.exports.others import coverage_lines
+
     lines = [f"{out}: {TARGETS[made.target]}, of {rig.name}"]
     lines += [f"  {line}" for line in coverage_lines(made.says, made.leaves_out)]
     lines += [f"  without {name}: {_apart(one)}" for name, one in verified.losses.items()]

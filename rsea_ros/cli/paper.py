@@ -1,24 +1,21 @@
 """`rsea paper`: every table and figure of the paper recomputed beside the printed value."""
 
+from __future__ import annotations
+
 import argparse
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
-import numpy as np
-
-from msg_adapters import read_record, write_record
 from rsea_ros.cli._output import add_json, add_results, path, print_file, results_place
 from rsea_ros.cli._terminal import progress, whole_number
 from rsea_ros.errors import ParameterError
-from rsea_ros.identification.excitation import ExcitationSettings, excitation
-from rsea_ros.identification.frequency_response import estimate_response
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.model.simulation import synthesize
 from rsea_ros.outputs.new_files import Destination, NewFiles, check_free
-from rsea_ros.paper.figures import documentation_figures
-from rsea_ros.paper.page import PaperTests, paper_json, paper_report
-from rsea_ros.paper.rival_models import RATE, moving_output
 from rsea_ros.records.record import Channel, Record
 from rsea_ros.report.result_files import PAPER_JSON, REPORT, json_text
+
+if TYPE_CHECKING:
+    from rsea_ros.paper.page import PaperTests
 
 HELP = "recompute every equation, table and figure of the paper beside the printed value"
 EXAMPLE = "rsea paper --out paper"
@@ -51,6 +48,8 @@ def run(args: argparse.Namespace) -> int:
         return _figures(args)
     if not args.duration >= SHORTEST:
         raise ParameterError(f"--duration {args.duration:g} s, expected at least {SHORTEST:g} s")
+    from rsea_ros.paper.page import paper_json, paper_report
+
     with progress("paper") as tell, NewFiles(results_place(args, "out/paper", FILES)) as new:
         tests = _tests(args, new, tell)
         tell("page", 0.95)
@@ -77,6 +76,8 @@ def _share(explained: float) -> str:
 
 
 def _figures(args: argparse.Namespace) -> int:
+    from rsea_ros.paper.figures import documentation_figures
+
     figures = documentation_figures()
     check_free((args.figures / name for name in figures), force=args.force)
     with NewFiles(Destination(args.figures, args.force)) as new:
@@ -87,6 +88,15 @@ def _figures(args: argparse.Namespace) -> int:
 
 
 def _tests(args: argparse.Namespace, new: NewFiles, tell: Callable[[str, float], None]) -> PaperTests:
+    import numpy as np
+
+    from msg_adapters import read_record, write_record
+    from rsea_ros.identification.excitation import ExcitationSettings, excitation
+    from rsea_ros.identification.frequency_response import estimate_response
+    from rsea_ros.model.simulation import synthesize
+    from rsea_ros.paper.page import PaperTests
+    from rsea_ros.paper.rival_models import RATE, moving_output
+
     def bag(name: str, record: Record) -> Record:
         path = new.stage(f"{name}.mcap")
         write_record(record, path)

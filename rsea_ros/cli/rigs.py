@@ -3,7 +3,6 @@
 import argparse
 
 from rsea_ros.cli._terminal import columns, say
-from rsea_ros.model.rig_file import load_rig, rig_names
 
 HELP = "list the rigs of the package, with a description of each bench"
 EXAMPLE = "rsea rigs"
@@ -14,6 +13,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
+    from rsea_ros.model.rig_file import load_rig, rig_names
+
     print(columns([(name, load_rig(name).about) for name in rig_names()]))
     print()
     say("rsea rig check NAME shows the values of a rig; rsea rig new NAME starts a new one.")

@@ -34,6 +34,10 @@ UNITS: Mapping[str, str] = {
 REQUIRED = ("train", "ratio", "continuous_torque", "reflected_inertia", "reflected_damping")
 
 
+PAPERS = "rd85x13-hd_cpl-25a-160"
+"""The motor and gear of the paper's example."""
+
+
 @dataclass(frozen=True)
 class MotorGear:
     """A motor with its gear.

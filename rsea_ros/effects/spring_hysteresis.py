@@ -53,14 +53,20 @@ def along(z, u, gamma):  # type: ignore[no-untyped-def]
     return min(max(z + rest * gain, -_LARGEST), _LARGEST), area + z * u + rest * rise
 
 
+@njit(inline="always")
+def way_of(s, x):  # type: ignore[no-untyped-def]
+    """Return how far the deflection has gone in the step; from where it was found at first, no way."""
+    if s[COMMIT] != 1.0:
+        return s[DEFLECTION_SPAN]
+    return s[DEFLECTION] - x[LAST] if x[STARTED] != 0.0 else 0.0
+
+
 @compiled
 def apply(s, p, x):  # type: ignore[no-untyped-def]
     """Add the mean torque of the step, or, when it is done, the torque at its end."""
     if p[0] == 0.0:
         return
-    way = s[DEFLECTION] - x[LAST] if s[COMMIT] == 1.0 else s[DEFLECTION_SPAN]
-    if x[STARTED] == 0.0 and s[COMMIT] == 1.0:
-        way = 0.0
+    way = way_of(s, x)
     u, side = abs(way) / p[1], math.copysign(1.0, way)
     end, area = along(side * x[Z], u, p[2])
     if s[COMMIT] == 1.0:

@@ -11,9 +11,8 @@ rubber and polymer springs: share 0.03 to 0.5, ten milliseconds to seconds.
 import math
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
-from rsea_ros.effects.signal_table import COMMIT, DEFLECTION, DEFLECTION_SPAN, K_S, SPRING_TORQUE, STEP, Port
-
-Z, LAST, STARTED = range(3)
+from rsea_ros.effects.signal_table import COMMIT, DEFLECTION, K_S, SPRING_TORQUE, STEP, Port
+from rsea_ros.effects.spring_hysteresis import LAST, STARTED, Z, way_of
 
 
 @compiled
@@ -21,11 +20,8 @@ def apply(s, p, x):  # type: ignore[no-untyped-def]
     """Add the mean torque of the step, or, when it is done, the torque at its end."""
     if p[0] == 0.0:
         return
-    way = s[DEFLECTION] - x[LAST] if s[COMMIT] == 1.0 else s[DEFLECTION_SPAN]
-    if x[STARTED] == 0.0 and s[COMMIT] == 1.0:
-        way = 0.0
     u = s[STEP] / p[1]
-    steady, left = way / u, -math.expm1(-u)
+    steady, left = way_of(s, x) / u, -math.expm1(-u)
     if s[COMMIT] == 1.0:
         x[Z] += (steady - x[Z]) * left
         x[LAST], x[STARTED] = s[DEFLECTION], 1.0

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rsea_ros.design.motor_gear_units import PAPERS, unit_named
 from rsea_ros.errors import ParameterError
 from rsea_ros.library.diagnosed import Diagnosed
 from rsea_ros.library.identified import Fit
@@ -18,8 +19,6 @@ if TYPE_CHECKING:
     from rsea_ros.design.spring_design import SpringDesign
     from rsea_ros.experiment.advice import Advice
     from rsea_ros.laws.law import LawResult
-
-UNIT = "rd85x13-hd_cpl-25a-160"
 
 
 def save(thing: Rig | Fit | Diagnosed | Record, path: str | Path, *, force: bool = False) -> None:
@@ -84,7 +83,7 @@ def experiment(
         return advise(hypotheses, asked, {}, pools.run, tell)
 
 
-def design(*, stiffness: float | None = None, unit: str = UNIT, **demands: float) -> SpringDesign:
+def design(*, stiffness: float | None = None, unit: str = PAPERS, **demands: float) -> SpringDesign:
     """Return the spring of least stiffness that meets all demands, by the paper's method; or test one.
 
     stiffness: N m/rad, to test instead. unit: motor and gear, by name in the catalogue. demands: torque N m,
@@ -93,7 +92,6 @@ def design(*, stiffness: float | None = None, unit: str = UNIT, **demands: float
     Raises ParameterError for a demand that no spring of this kind meets. Method: docs/derivation.md.
     """
     from rsea_ros.design.mechanism import Requirement
-    from rsea_ros.design.motor_gear_units import unit_named
     from rsea_ros.design.spring_design import least_stiffness, spring_design
     from rsea_ros.documents.wording import did_you_mean, quote
 
