@@ -127,10 +127,14 @@ def search(
 
 
 def searched_effects(nominal: Problem, without: Collection[str]) -> list[Effect]:
-    """Return the effects that are tried beside a nominal model, with bounds that suit its machine."""
+    """Return the effects that are tried beside a nominal model, with bounds that suit its machine.
+
+    What is common to all sensors is a delay of the command: a late one is seen beside another alone.
+    """
     scale = scale_of(nominal.cases, nominal.rig)
     searched = (e for e in catalogue().values() if e.is_searched and e.name not in without)
-    return [e.at(scale) for e in searched]
+    sensors = {"position" if n == "velocity" else n for case in nominal.cases for n in case.measured}
+    return [e.at(scale) for e in searched if "late" not in e.tags or sensors > {e.sensor}]
 
 
 def _steady(checked: Sequence[Checked], rig: Rig) -> tuple[list[Checked], tuple[Remark, ...]]:

@@ -11,11 +11,10 @@ import numpy as np
 
 from rsea_ros.compiler import njit
 from rsea_ros.effects._held import put_beside
+from rsea_ros.effects._late import LENGTH
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
 from rsea_ros.effects.signal_table import AFTER, COMMAND, HELD, REFERENCE, STEP, TARGETED, Port
 
-LENGTH = 1023
-"""Steps that are kept: 60 ms at a step of 60 us."""
 ENDS, MEANS = 1, 1 + LENGTH
 STARTED = 1 + 2 * LENGTH
 

@@ -27,12 +27,12 @@ _SIGNATURE = types.void(_POINTER, _POINTER, _POINTER)
 _ROUNDING = 1e-9
 """Of the wider bound: what a fitted value may lie beyond it through logarithms and decimal digits."""
 Parity = Literal["odd", "even", "neither"]
-Tag = Literal["delay", "lag", "play", "mode", "friction", "limit"]
+Tag = Literal["delay", "late", "lag", "play", "mode", "friction", "limit"]
 """What others have to know of an effect's kind.
 
-delay: shifts the command by its main parameter, s, and does nothing else. play: its main parameter is a gap,
-rad. mode: adds a resonance, near which derivatives do not reach far. friction: a torque of the gear train
-that depends on how it moves. limit: its main parameter is the largest torque, N m.
+delay, late: shifts the command, or a sensor, by its main parameter, s, and does nothing else. play: its
+main parameter is a gap, rad. mode: adds a resonance, near which derivatives do not reach far. friction: a
+torque of the gear train that depends on how it moves. limit: its main parameter is the largest torque, N m.
 """
 Response = Callable[[Sequence[float], Any], Any]
 """Parameters in order and s = 2 pi i f, shape (n,), to the factor on the effect's signal, shape (n,)."""
@@ -144,6 +144,11 @@ class Effect:
     def main(self) -> Parameter:
         """Return the first parameter, which gives the size of the effect."""
         return self.parameters[0]
+
+    @property
+    def sensor(self) -> str:
+        """Return the channel in which an effect at a sensor acts: the F/T's or the encoder's."""
+        return "position" if self.claims.channel in ("position", "velocity") else "ft"
 
     @property
     def null(self) -> dict[str, float]:

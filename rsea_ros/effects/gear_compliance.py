@@ -29,9 +29,10 @@ def change(rig: Any, parameters: Mapping[str, float]) -> Any:
     moved = 0.0 if idle(rig) else parameters[_SHARE] * rotor
     is_on_load = rig.rigid_spring and rig.end_is_free("spring_end")
     beyond = chassis + moved + (rig["spring_end.inertia"] if is_on_load else 0.0)
+    damping = 2.0 * parameters["damping_ratio"] * math.sqrt(stiffness * beyond)
     values = {
         "gear.stiffness": stiffness,
-        "gear.damping": 2.0 * parameters["damping_ratio"] * math.sqrt(stiffness * beyond),
+        "gear.damping": damping if damping > 1e-9 else 0.0,  # a fit came to 1e-14, which no rig states
         "rotor.reflected_inertia": rotor - moved,
         "chassis.inertia": chassis + moved,
     }

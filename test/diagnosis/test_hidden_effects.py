@@ -23,7 +23,7 @@ from rsea_ros.model.prediction_errors import predict
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
-from rsea_ros.records.record import Channel
+from rsea_ros.records.record import Channel, Record
 from rsea_ros.report.remark_words import remark_sentences
 
 RIG = load_rig("paper_high_impedance")
@@ -85,6 +85,23 @@ def test_both_of_two_causes_are_found_with_their_sizes():
     assert diagnosis.verdict == "explained"
     values = {c.name: c.parameters[MAIN_PARAMETER[c.name]].value for c in diagnosis.causes}
     assert values == pytest.approx(sizes, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("effect", "channels"), [("ft_delay", ("ft",)), ("encoder_delay", ("position", "velocity"))]
+)
+def test_a_sensor_that_is_read_late_is_no_fault_of_the_bench(effect, channels):
+    """Nor a filter of the sensor, nor a mode: all of them were named for one that was 2 to 8 ms late."""
+    record = record_run(drawn_bench(np.random.default_rng(7)), 7001, "multisine", 6.0)
+    late = {n: Channel(record[n].t + 4e-3, record[n].y) for n in channels}
+    tried = only(
+        "ft_delay", "encoder_delay", "command_delay", "ft_sensor_lag", "base_compliance", "coulomb_friction"
+    )
+    (cause,) = diagnose([Record({**record.channels, **late}, "late")], RIG, settings=tried).causes
+    low, high = cause.parameters["delay"].ci95
+    assert cause.name == effect
+    assert cause.status == "confirmed"
+    assert low < 4e-3 < high < 4.5e-3
 
 
 def test_strong_cogging_is_named_with_its_size():

@@ -199,10 +199,15 @@ LAWS: dict[str, tuple[int, Law]] = {
     "voltage_sag": (2, plain(sag)),
 }  # fmt: skip
 """For each effect how many states its equations have, and the equations."""
+LATE = {"ft_delay": ("ft",), "encoder_delay": ("position", "velocity")}
+"""Channels read late, of a bench that is linear: there they are those of a command that is as late."""
 
 
 def solve(name: str, p: Mapping[str, float], held: np.ndarray, period: float) -> dict[str, np.ndarray]:
     """Return ft, position and velocity at the end of each hold, from rest."""
+    if name in LATE:
+        now, late = (solve("command_delay", {"delay": d}, held, period) for d in (0.0, p["delay"]))
+        return now | {channel: late[channel] for channel in LATE[name]}
     states, law = LAWS[name]
     ends, delay = period * np.arange(1, len(held) + 1), p.get("delay", 0.0)
     switches = np.concatenate([[0.0, delay], ends + delay, ends])

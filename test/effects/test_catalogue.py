@@ -52,7 +52,7 @@ RIGS = "paper_high_impedance", "paper_moving_output", "prototype_knee", "bare_dr
 
 
 def test_every_effect_of_the_contract_is_in_the_catalogue():
-    assert set(CONTRACT) | {"viscoelastic_spring"} <= set(catalogue())
+    assert set(CONTRACT) | {"viscoelastic_spring", "ft_delay", "encoder_delay"} <= set(catalogue())
     assert all(effect.inspect for effect in catalogue().values()), "what a mechanic looks at"
 
 

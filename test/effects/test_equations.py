@@ -30,7 +30,7 @@ TOLERANCE = {"ft": 6e-3, "position": 1.5e-6, "velocity": 8e-5}
 
 
 def test_every_effect_has_an_independent_equation():
-    assert set(slow_equations.LAWS) == {e.name for e in ON_THE_BENCH}
+    assert {*slow_equations.LAWS, *slow_equations.LATE} == {e.name for e in ON_THE_BENCH}
 
 
 def test_both_implementations_agree_without_effects():
@@ -208,6 +208,13 @@ def test_a_chassis_without_a_stated_inertia_takes_a_part_of_the_rotors():
     assert soft["rotor.reflected_inertia"] + soft["chassis.inertia"] == pytest.approx(
         rig["rotor.reflected_inertia"]
     )
+
+
+def test_a_fit_that_leaves_no_damping_leaves_a_rig():
+    """A diagnosis ended there: 1e-14 N m s/rad is no value of a rig."""
+    rig = load_rig("paper_high_impedance")
+    soft = effect_named("gear_compliance").structure(rig, {"stiffness": 1e4, "damping_ratio": 1e-15})
+    assert soft["gear.damping"] == 0.0
 
 
 def test_a_stated_chassis_keeps_its_inertia():

@@ -177,7 +177,7 @@ def _signal(case: Case, out: dict[str, FloatArray], effect: Effect) -> FloatArra
     if effect.port in (st.Port.COMMAND, st.Port.MOTOR):
         return drive.command
     if effect.port is st.Port.SENSOR:
-        return out.get("ft")
+        return out.get(effect.sensor)
     middles = drive.start + drive.step * (np.arange(len(drive.command)) + 0.5)
     if st.GEAR_VELOCITY in effect.reads and "velocity" in out:
         return np.asarray(np.interp(middles, case.t["velocity"], out["velocity"]))
@@ -227,7 +227,8 @@ def _with_part(
 ) -> list[dict[str, FloatArray]]:
     """Return the channels with one part of the spline acting where the effect does."""
     if effect.port is st.Port.SENSOR:
-        return [{**out, "ft": out["ft"] + part} for out, part in zip(base, parts, strict=True)]
+        seen = effect.sensor
+        return [{**out, seen: out[seen] + part} for out, part in zip(base, parts, strict=True)]
     drives = [c.drive for c in problem.cases]
     if not all(isinstance(d, Drive) for d in drives):
         return [{"motor_torque": o["motor_torque"] + p} for o, p in zip(base, parts, strict=True)]

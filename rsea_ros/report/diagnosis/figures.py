@@ -87,7 +87,7 @@ def sketch(causes: Sequence[str]) -> Html:
 
 def part_of(effect: Effect) -> str:
     """Return the part of the bench that an effect sits in."""
-    if effect.port == Port.SENSOR and effect.claims.channel in ("position", "velocity"):
+    if effect.port == Port.SENSOR and effect.sensor == "position":
         return "encoder"
     return effect.part if effect.part in _PARTS else _OF_PORT[effect.port]
 
