@@ -20,10 +20,9 @@ if TYPE_CHECKING:
     from rsea_ros.control.following import closed_loop
     from rsea_ros.diagnosis.settings import DiagnosisSettings
     from rsea_ros.errors import RseaError
-    from rsea_ros.library.checking import check
     from rsea_ros.library.diagnosed import diagnose
     from rsea_ros.library.identified import identify
-    from rsea_ros.library.records import read_bag, simulate
+    from rsea_ros.library.records import check, read_bag, simulate
     from rsea_ros.library.studies import design, experiment, law, save
     from rsea_ros.model.observer.observer import Observer, observe
     from rsea_ros.model.prediction_errors import predict
@@ -39,7 +38,7 @@ DOOR = {
     "Rig": "model.rig",
     "RseaError": "errors",
     "TorqueController": "control.controller",
-    "check": "library.checking",
+    "check": "library.records",
     "closed_loop": "control.following",
     "design": "library.studies",
     "diagnose": "library.diagnosed",

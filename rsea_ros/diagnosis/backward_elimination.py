@@ -10,6 +10,7 @@ from rsea_ros.diagnosis.candidate import (
     FitSetup,
     effect_size,
     fit_candidate,
+    is_apart,
     is_within_clocks,
     without_effect,
 )
@@ -74,7 +75,7 @@ class ReducedModels:
             (name, rival)
             for name in model.causes
             for rival in look_alikes(name, self.effects)
-            if rival.name not in model.problem.acting
+            if rival.name not in model.problem.acting and is_apart(rival, model.problem)
             and effect_size(rival.name) < effect_size(name) + as_simple
         ]
         rests = self.without(model) if pairs else {}

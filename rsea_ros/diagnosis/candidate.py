@@ -9,6 +9,7 @@ from rsea_ros.diagnosis.data_split import TRAIN, VALIDATION, part
 from rsea_ros.diagnosis.score import Score, score_on
 from rsea_ros.diagnosis.settings import DEFAULT, BlockSettings, DiagnosisSettings
 from rsea_ros.effects.catalogue import effect_named
+from rsea_ros.effects.effect import Effect
 from rsea_ros.identification.noise_level import reestimate_noise
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Map, Solution, serial, solve
@@ -76,23 +77,57 @@ def with_clocks(problem: Problem, theta: FloatArray, model: Problem) -> tuple[Pr
     return larger, np.concatenate([theta, np.zeros(len(clocks))])
 
 
-def with_common_clock_in_delay(solution: Solution) -> FloatArray | None:
-    """Return theta with the clock error that all sensors share converted into a delay of the command.
+def _sensor(channel: str) -> str:
+    """Return the sensor of a channel: the velocity is that of the encoder."""
+    return "position" if channel == "velocity" else channel
 
-    Where a delay is a whole number of samples the residual has a kink, and a fit may stop there with the
-    rest in the clocks. None for a model without a delay.
+
+def is_apart(effect: Effect, model: Problem) -> bool:
+    """Return whether a model does not already have an effect under another name.
+
+    What is common to all sensors is a delay of the command, never each of them late. Of one sensor alone the
+    motor's measured torque tells it.
     """
-    names = [u.name for u in solution.problem.unknowns]
-    clocks = [i for i, u in enumerate(solution.problem.unknowns) if u.is_clock and not u.is_rate]
-    acting = [e for e in map(effect_named, solution.problem.acting) if "delay" in e.tags]
-    delay = next((d for d in (f"{e.name}.{e.main.name}" for e in acting) if d in names), None)
-    if delay is None or not clocks:
+    if "late" not in effect.tags:
+        return True
+    late = {e.sensor for e in map(effect_named, model.acting) if "late" in e.tags}
+    sensors = {_sensor(channel) for case in model.cases for channel in case.measured}
+    return bool(sensors - late - {effect.sensor} - ({"motor_torque"} if late else set()))
+
+
+def with_clocks_in_delays(solution: Solution) -> FloatArray | None:
+    """Return theta with the clock errors that are delays of the model converted into these.
+
+    The clock of a sensor that is read late goes into its delay, what the others share into the command's.
+    Where a delay is a whole number of samples the residual has a kink, and a fit may stop there with the rest
+    in the clocks. None for a model without a delay.
+    """
+    unknowns = solution.problem.unknowns
+    place = {u.name: i for i, u in enumerate(unknowns)}
+    acting = [(e, place.get(f"{e.name}.{e.main.name}")) for e in map(effect_named, solution.problem.acting)]
+    command = [at for e, at in acting if at is not None and "delay" in e.tags][:1]
+    late = {e.sensor: at for e, at in acting if at is not None and "late" in e.tags}
+    clocks = [i for i, u in enumerate(unknowns) if u.is_clock and not u.is_rate]
+    if not clocks or not (command or late):
         return None
+    sensors = [_sensor(unknowns[i].name.split(".")[1]) for i in clocks]
     theta = solution.theta.copy()
-    common = float(np.mean(theta[clocks]))
-    theta[clocks] -= common
-    theta[names.index(delay)] -= common
+    for sensor, at in late.items():
+        own = [i for i, n in zip(clocks, sensors, strict=True) if n == sensor]
+        theta[at] -= _shared(theta, own)
+    others = [i for i, n in zip(clocks, sensors, strict=True) if n not in late]
+    if command and others:
+        common = _shared(theta, others)
+        theta[command] -= common
+        theta[list(late.values())] += common
     return np.asarray(theta)
+
+
+def _shared(theta: FloatArray, places: list[int]) -> float:
+    """Return what some clocks have in common, s, and take it from them."""
+    common = float(np.mean(theta[places])) if places else 0.0
+    theta[places] -= common
+    return common
 
 
 @dataclass(frozen=True)
@@ -185,7 +220,7 @@ def fit_candidate(
     """
     masked = setup.mask(problem)
     solution = setup.solve(masked, theta, None if near is None else _reweight(near, masked))
-    moved = with_common_clock_in_delay(solution)
+    moved = with_clocks_in_delays(solution)
     if moved is not None:
         solution = min(solution, setup.solve(masked, moved), key=lambda s: s.cost)
     outputs = solution.problem.outputs(solution.theta)

@@ -11,6 +11,7 @@ from dataclasses import replace
 from rsea_ros.checks.carried import check_diagnosable
 from rsea_ros.checks.faults import Checked, check
 from rsea_ros.diagnosis.backward_elimination import eliminate_backwards
+from rsea_ros.diagnosis.candidate import is_apart
 from rsea_ros.diagnosis.evaluation import Evaluated, Examined, Selection, evaluate, held_out_data
 from rsea_ros.diagnosis.naming.conclusion import conclude
 from rsea_ros.diagnosis.result import Diagnosis
@@ -127,14 +128,10 @@ def search(
 
 
 def searched_effects(nominal: Problem, without: Collection[str]) -> list[Effect]:
-    """Return the effects that are tried beside a nominal model, with bounds that suit its machine.
-
-    What is common to all sensors is a delay of the command: a late one is seen beside another alone.
-    """
+    """Return the effects that are tried beside a nominal model, with bounds that suit its machine."""
     scale = scale_of(nominal.cases, nominal.rig)
     searched = (e for e in catalogue().values() if e.is_searched and e.name not in without)
-    sensors = {"position" if n == "velocity" else n for case in nominal.cases for n in case.measured}
-    return [e.at(scale) for e in searched if "late" not in e.tags or sensors > {e.sensor}]
+    return [e.at(scale) for e in searched if is_apart(e, nominal)]
 
 
 def _steady(checked: Sequence[Checked], rig: Rig) -> tuple[list[Checked], tuple[Remark, ...]]:

@@ -18,6 +18,7 @@ from rsea_ros.diagnosis.candidate import (
     FitSetup,
     fit_candidate,
     in_units_of,
+    is_apart,
     paid_for,
     refit,
     with_clocks,
@@ -219,7 +220,8 @@ class StepFits:
 
     def screen(self, solution: Solution) -> list[ScreenedEffect]:
         """Return every other effect after two cheap steps beside a solution, best first."""
-        effects = [e for e in self.effects if e.name not in solution.problem.acting]
+        model = solution.problem
+        effects = [e for e in self.effects if e.name not in model.acting and is_apart(e, model)]
         guesses = self.guesses
 
         def try_effect(i: int) -> ScreenedEffect | None:

@@ -11,7 +11,7 @@ import numpy as np
 
 from rsea_ros.compiler import njit
 from rsea_ros.effects._held import put_beside
-from rsea_ros.effects._late import LENGTH
+from rsea_ros.effects._time import LENGTH
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
 from rsea_ros.effects.signal_table import AFTER, COMMAND, HELD, REFERENCE, STEP, TARGETED, Port
 

@@ -6,8 +6,8 @@ The velocity is that of the same encoder. A known delay belongs into the rig, as
 Source: Astrom, Wittenmark, Computer-Controlled Systems, 1997, ch. 2 (systems with a time delay).
 """
 
-from rsea_ros.effects._late import RING, older
-from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
+from rsea_ros.effects._time import AGE, RING, older
+from rsea_ros.effects.effect import Claims, Effect, compiled
 from rsea_ros.effects.signal_table import POSITION, STEP, VELOCITY, Port
 
 
@@ -23,13 +23,7 @@ EFFECT = Effect(
     name="encoder_delay",
     port=Port.SENSOR,
     order=15,
-    parameters=(
-        Parameter(
-            "delay", "s", null=0.0, low=0.0, high=0.06, typical=5e-3, starts=(1e-3, 0.015, 0.03),
-            is_fixed=True,
-            reason="drives and serial adapters: one cycle at 1 kHz to three at 50 Hz",
-        ),
-    ),
+    parameters=(AGE,),
     claims=Claims("velocity", "odd", amplitude_exponent=1.0, confusable_with=("command_delay",)),
     function=apply,
     states=2 * RING,

@@ -5,7 +5,7 @@
 Source: Bentley, Principles of Measurement Systems, 2005, section 2.1 (interfering input: the temperature).
 """
 
-from rsea_ros.effects._drift import SETTLING, progress
+from rsea_ros.effects._time import SETTLING, progress
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
 from rsea_ros.effects.signal_table import DURATION, FT, TIME, Port
 

@@ -7,8 +7,8 @@ The measured current does not show it. Source: Sebastian, Temperature effects on
 efficiency of PM motors, IEEE Trans. Ind. Appl. 31, 1995.
 """
 
-from rsea_ros.effects._drift import SETTLING, progress
 from rsea_ros.effects._held import scale
+from rsea_ros.effects._time import SETTLING, progress
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
 from rsea_ros.effects.signal_table import DURATION, STEP, TIME, Port
 

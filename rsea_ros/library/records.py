@@ -1,13 +1,15 @@
-"""`rsea.read_bag` and `rsea.simulate`: the record of a run, recorded or simulated, without ROS."""
+"""`rsea.read_bag`, `rsea.simulate` and `rsea.check`: the record of a run, and what is wrong with it."""
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
 from msg_adapters import TopicMap, read_record
+from rsea_ros.checks.finding import Finding, Findings, Light
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
@@ -55,3 +57,47 @@ def simulate(
     if not (math.isfinite(rate) and rate > 0.0):
         raise ParameterError(f"rate = {rate:g} Hz, expected a finite rate > 0")
     return synthesize(load_rig(rig), Channel(np.arange(len(values)) / rate, values), seed=seed, noise=noise)
+
+
+@dataclass(frozen=True)
+class Checks:
+    """Findings of a check with a traffic light each. `result` also holds the faults of the data."""
+
+    result: Findings
+
+    @property
+    def light(self) -> Light:
+        """The worst light: `green`, `amber` or `red`."""
+        return self.result.light
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """The findings, each with light, value, unit, expected value and remedy."""
+        return self.result.findings
+
+    def summary(self) -> str:
+        """Return the findings in plain text."""
+        from rsea_ros.report.check import check_lines
+
+        return "\n".join(line.plain for line in check_lines(self.result))
+
+    def _repr_html_(self) -> str:
+        from html import escape
+
+        return f"<pre>{escape(self.summary())}</pre>"
+
+    def __repr__(self) -> str:
+        """Return the rig, the worst light and the findings that are not green in one line."""
+        marked = [f"{f.kind} {f.channel}".strip() for f in self.findings if f.light != "green"]
+        return f"Checks({self.result.rig_name}: {self.light}{': ' if marked else ''}{', '.join(marked)})"
+
+
+def check(data: Record, rig: Rig | str) -> Checks:
+    """Check a record against a rig: gaps, clocks, noise, dead channels, sign, scale, excitation.
+
+    rig: a Rig, a file, or the name of a rig in config/rigs. The record is not changed. Bad data are findings,
+    not errors; raises RigError for the rig. Takes seconds, and fits no physics beyond a linear response.
+    """
+    from rsea_ros.checks.check import check_record
+
+    return Checks(check_record(data, load_rig(rig), values=True))

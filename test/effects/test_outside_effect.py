@@ -14,7 +14,7 @@ from similar_machine import record_with
 from rsea_ros.control.compensation import compensation
 from rsea_ros.control.law import responses, sample_rig
 from rsea_ros.control.uncertainty import lag_responses
-from rsea_ros.diagnosis.candidate import with_common_clock_in_delay
+from rsea_ros.diagnosis.candidate import with_clocks_in_delays
 from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.diagnosis.naming.conclusion import undetermined_play
 from rsea_ros.diagnosis.settings import DiagnosisSettings
@@ -171,4 +171,4 @@ def test_a_delay_of_another_name_is_treated_as_a_delay():
     np.testing.assert_array_equal(response, responses(plant, hz))
     case = case_from(record_with(RIG, effect_named("late_bus"), 1.0, duration=5.0), rig)
     solution = solve(Problem((case,), rig, unknowns_of(rig, (case,)), MEASURED), iterations=0)
-    assert with_common_clock_in_delay(solution) is not None
+    assert with_clocks_in_delays(solution) is not None

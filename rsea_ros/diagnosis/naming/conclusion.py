@@ -258,13 +258,12 @@ def with_sure_gains(
 ) -> dict[str, Named]:
     """Return the naming with no cause named whose own gain on held-out data may be none.
 
-    Except where only all causes together leave nothing but noise: of two that act together each may gain
-    nothing alone.
+    Except on the way to nothing but noise: of two that act together each may gain nothing alone.
     """
-    without, with_all = (is_at_floor(stages[k].test, settings.floor) for k in (0, -1))
-    if with_all and not without:
-        return dict(naming)
-    gains = {step[1].added: own_gain(step, channel, settings) for step in itertools.pairwise(stages)}
+    reached = [is_at_floor(stage.test, settings.floor) for stage in stages]
+    steps = zip(itertools.pairwise(stages), reached, strict=False)
+    needless = [step for step, before in steps if before or not reached[-1]]
+    gains = {step[1].added: own_gain(step, channel, settings) for step in needless}
     unsure = {name for name, (_, _, (low, _)) in gains.items() if not low > 0.0}
     return {
         name: replace(by, status=None, has_gain=False) if name in unsure else by
