@@ -5,8 +5,8 @@ import random
 
 import pytest
 
-from rsea_ros.hardware.dynamixel.frames import StatusFrameParser, frame, stuff, unstuff
 from rsea_ros.hardware.dynamixel.bus import PacketHandler
+from rsea_ros.hardware.dynamixel.frames import StatusFrameParser, frame, stuff, unstuff
 from rsea_ros.hardware.peer import protocol2
 
 ALPHABET = (0xFF, 0xFD, 0x00, 0x55)
