@@ -214,8 +214,8 @@ def score_of(ratios):
 def test_where_only_noise_is_left_already_a_cause_is_named_only_for_a_sure_gain(left, status, name):
     """A drift of -0.002 % was named in a clean record, a mode beside two delays that left nothing of it.
 
-    left: times the noise, without a cause, with backlash and with both. Of two that act together the first may
-    gain nothing alone.
+    left: times the noise, without a cause, with backlash and with both. Of two that act together the first
+    may gain nothing alone.
     """
     steps = zip(("", "backlash", "damping_drift"), left, strict=True)
     stages = [SimpleNamespace(added=n, test=score_of({"ft": level})) for n, level in steps]
