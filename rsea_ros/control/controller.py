@@ -126,7 +126,7 @@ class TorqueController:
         link: share of the motion in `Measurement.link` that is fed forward (link.link_share), by default
         nothing. Raises ParameterError for a rig whose torque cannot be controlled.
         """
-        limits, link = limits or TorqueLimits.of(rig), link or LinkShare()
+        self.rate, limits, link = rate, limits or TorqueLimits.of(rig), link or LinkShare()
         settings = settings or ControllerSettings()
         gains = gains or design(rig, load_range(rig, lightest(rig)), rate).gains
         self._law: FeedbackLaw = law_of(rig, rate, gains)

@@ -12,6 +12,7 @@ import numpy as np
 from rsea_ros.control.controller import ControllerSettings, Measurement, TorqueController, TorqueLimits
 from rsea_ros.control.synthesis import ControllerDesign
 from rsea_ros.control.uncertainty import lock
+from rsea_ros.errors import ParameterError
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.simulation import Plant, PlantSample
 from rsea_ros.records.record import ComplexArray, FloatArray
@@ -46,8 +47,12 @@ def closed_loop(
     """Run a controller on a simulated rig from rest. desired: N m at the samples, shape (n,).
 
     A command that is computed at a sample acts from the next one on: one sample of delay. late: samples
-    more.
+    more. Raises ParameterError for a controller of another rate.
     """
+    if not isinstance(controller, TorqueController):
+        raise ParameterError(f"controller: {type(controller).__name__}, expected a TorqueController")
+    if controller.rate != rate:
+        raise ParameterError(f"rate = {rate} Hz, expected that of the controller, {controller.rate} Hz")
     plant = Plant(rig, rate, noise=noise)
     sample = plant.step(0.0)
     pending, rows = [0.0] * (1 + late), np.empty((len(desired), 3))

@@ -109,3 +109,11 @@ def test_gains_that_are_unstable_with_any_load_are_refused_with_that_load():
     with pytest.raises(ParameterError, match="the lags of its effects"):
         check(slow, load_range(slow, FREE_RIG), RATE, GAINS)
     assert grid(RATE)[-1] < 0.5 * RATE
+
+
+def test_a_controller_of_another_rate_or_none_is_refused():
+    controller = TorqueController(LOCKED_RIG, RATE, GAINS)
+    with pytest.raises(ParameterError, match=r"rate = 500.0 Hz, expected that of the controller, 280.0 Hz"):
+        closed_loop(LOCKED_RIG, 500.0, controller, np.zeros(3))
+    with pytest.raises(ParameterError, match="controller: NoneType, expected a TorqueController"):
+        closed_loop(LOCKED_RIG, RATE, None, np.zeros(3))
