@@ -4,6 +4,10 @@ A message says what, value, unit, limit and where. The command line prints it as
 with status 2; a node turns it into a log line and a diagnostic.
 """
 
+import math
+from numbers import Real
+from typing import Any
+
 
 class RseaError(Exception):
     """Root of all errors of this package."""
@@ -57,3 +61,22 @@ class OutputError(RseaError, OSError):
 
 class DeviceError(RseaError, OSError):
     """A device that does not answer, or answers with a fault."""
+
+
+def check_kind(name: str, value: object, kind: type | tuple[type, ...], expected: str) -> None:
+    """Raise ParameterError for an argument of the wrong type; a door asks before it works."""
+    if not isinstance(value, kind):
+        raise ParameterError(f"{name}: {type(value).__name__}, expected {expected}")
+
+
+def check_number(name: str, value: object) -> None:
+    """Raise ParameterError for an argument that is no number."""
+    if isinstance(value, bool) or not isinstance(value, Real):
+        raise ParameterError(f"{name}: {type(value).__name__}, expected a number")
+
+
+def check_rate(rate: Any) -> None:
+    """Raise ParameterError for what is no rate, Hz."""
+    check_number("rate", rate)
+    if not (math.isfinite(rate) and rate > 0.0):
+        raise ParameterError(f"rate = {rate:g} Hz, expected a finite rate > 0")

@@ -30,6 +30,7 @@ from rsea_ros.control.prediction import AHEAD, Acted, Prediction
 from rsea_ros.control.reference import Reference
 from rsea_ros.control.synthesis import design
 from rsea_ros.control.uncertainty import lightest, load_range, lock
+from rsea_ros.errors import check_kind, check_rate
 from rsea_ros.model.rig import MOTOR_TORQUE, Rig, motor_torque
 from rsea_ros.records.record import HUGE, NONSENSE, FloatArray, is_measured
 
@@ -126,6 +127,8 @@ class TorqueController:
         link: share of the motion in `Measurement.link` that is fed forward (link.link_share), by default
         nothing. Raises ParameterError for a rig whose torque cannot be controlled.
         """
+        check_kind("rig", rig, Rig, "a Rig (rsea.load_rig)")
+        check_rate(rate)
         self.rate, limits, link = rate, limits or TorqueLimits.of(rig), link or LinkShare()
         settings = settings or ControllerSettings()
         gains = gains or design(rig, load_range(rig, lightest(rig)), rate).gains

@@ -12,7 +12,7 @@ import numpy as np
 from rsea_ros.control.controller import ControllerSettings, Measurement, TorqueController, TorqueLimits
 from rsea_ros.control.synthesis import ControllerDesign
 from rsea_ros.control.uncertainty import lock
-from rsea_ros.errors import ParameterError
+from rsea_ros.errors import ParameterError, check_kind
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.simulation import Plant, PlantSample
 from rsea_ros.records.record import ComplexArray, FloatArray
@@ -27,6 +27,11 @@ class ControlTrace:
     ft: FloatArray
     command: FloatArray
     velocity: FloatArray
+
+    def __repr__(self) -> str:
+        """Return the size of the run in one line."""
+        most = float(np.abs(self.command).max())
+        return f"ControlTrace({len(self.t)} samples, {self.t[-1]:g} s, at most {most:.3g} N·m)"
 
     def error(self, settle: float = 0.0) -> float:
         """Return the RMS of ft - desired from `settle` (s) on, over that of desired."""
@@ -49,8 +54,12 @@ def closed_loop(
     A command that is computed at a sample acts from the next one on: one sample of delay. late: samples
     more. Raises ParameterError for a controller of another rate.
     """
-    if not isinstance(controller, TorqueController):
-        raise ParameterError(f"controller: {type(controller).__name__}, expected a TorqueController")
+    check_kind("rig", rig, Rig, "a Rig (rsea.load_rig)")
+    check_kind("controller", controller, TorqueController, "a TorqueController")
+    desired = np.asarray(desired)
+    if desired.dtype.kind not in "iuf" or desired.ndim != 1 or not np.isfinite(desired).all():
+        kind = f"shape {desired.shape} of {desired.dtype}"
+        raise ParameterError(f"desired: {kind}, expected (n,) finite torques in N·m")
     if controller.rate != rate:
         raise ParameterError(f"rate = {rate} Hz, expected that of the controller, {controller.rate} Hz")
     plant = Plant(rig, rate, noise=noise)
@@ -63,7 +72,7 @@ def closed_loop(
         sample = plant.step(pending.pop(0))
         pending.append(command)
     return ControlTrace(
-        np.arange(len(desired)) / rate, np.asarray(desired), rows[:, 0], rows[:, 1], rows[:, 2]
+        np.arange(len(desired)) / rate, desired, rows[:, 0], rows[:, 1], rows[:, 2]
     )
 
 

@@ -203,6 +203,12 @@ class Advice:
     proofs: tuple[Proof, ...]
     excluded: Mapping[str, float] = field(default_factory=dict)
 
+    def __repr__(self) -> str:
+        """Return the causes and the length of the run in one line."""
+        names = ", ".join(h.name for h in self.hypotheses)
+        run = f"a run of {len(self.proposal.command) / self.asked.rate:g} s" if self.proposal else "no run"
+        return f"Advice({names}: {run}, {len(self.proofs)} pairs that none separates)"
+
 
 _WORTH = 0.02
 """Share of what is undecided that a run must decide to be worth playing."""

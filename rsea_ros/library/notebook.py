@@ -1,7 +1,7 @@
 """Arguments and results of the library: records in, tables and a notebook's bar of progress out."""
 
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from html import escape
@@ -73,7 +73,7 @@ def plain(table: Table) -> str:
 
 def records_of(data: Record | Sequence[Record]) -> list[Record]:
     """Return one or several records as a list. Raises ParameterError for anything else."""
-    items: list[object] = [data] if isinstance(data, Record) else list(data)
+    items: list[object] = list(data) if isinstance(data, Iterable) else [data]
     records = [item for item in items if isinstance(item, Record)]
     if len(records) < len(items):
         kind = next(type(item).__name__ for item in items if not isinstance(item, Record))

@@ -1,6 +1,5 @@
 """`rsea.read_bag`, `rsea.simulate` and `rsea.check`: the record of a run, and what is wrong with it."""
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,7 +9,7 @@ import numpy.typing as npt
 
 from msg_adapters import TopicMap, read_record
 from rsea_ros.checks.finding import Finding, Findings, Light
-from rsea_ros.errors import ParameterError
+from rsea_ros.errors import ParameterError, check_kind, check_rate
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
@@ -33,6 +32,8 @@ def read_bag(
     Raises BagError with file, topic, field, value and expected value.
     Not to be confused with `rsea import`, which converts tables to bags.
     """
+    for each in [path] if isinstance(path, (str, Path)) or not isinstance(path, Sequence) else path:
+        check_kind("path", each, (str, Path), "a bag: a directory, an .mcap or a .db3 file")
     return read_record(path, topics=TopicMap(namespace=namespace, joint=joint, axis=axis), strict=strict)
 
 
@@ -54,8 +55,7 @@ def simulate(
     values = given.astype(np.float64)
     if rate is None:
         raise ParameterError("rate: not stated, expected that of the commands, Hz")
-    if not (math.isfinite(rate) and rate > 0.0):
-        raise ParameterError(f"rate = {rate:g} Hz, expected a finite rate > 0")
+    check_rate(rate)
     return synthesize(load_rig(rig), Channel(np.arange(len(values)) / rate, values), seed=seed, noise=noise)
 
 
@@ -100,4 +100,5 @@ def check(data: Record, rig: Rig | str) -> Checks:
     """
     from rsea_ros.checks.check import check_record
 
+    check_kind("data", data, Record, "a Record (Record.from_arrays, rsea.read_bag)")
     return Checks(check_record(data, load_rig(rig), values=True))

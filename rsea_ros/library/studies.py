@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rsea_ros.design.motor_gear_units import PAPERS, unit_named
-from rsea_ros.errors import ParameterError
+from rsea_ros.documents.wording import did_you_mean, quote
+from rsea_ros.errors import ParameterError, check_kind, check_number, check_rate
 from rsea_ros.library.diagnosed import Diagnosed
 from rsea_ros.library.identified import Fit
 from rsea_ros.model.rig import Rig
@@ -24,17 +25,20 @@ if TYPE_CHECKING:
 def save(thing: Rig | Fit | Diagnosed | Record, path: str | Path, *, force: bool = False) -> None:
     """Write a rig, or that of a fit or a diagnosis, as YAML for `load_rig`; a record as a bag for `read_bag`.
 
-    force: over what is there. Raises RigError or BagError where it cannot be written.
-    Not to be confused with write_report, which writes every result and its page.
+    force: over what is there. Raises RigError or BagError where it cannot be written, ParameterError for
+    another suffix. Not to be confused with write_report, which writes every result and its page.
     """
+    check_kind("save", thing, (Rig, Fit, Diagnosed, Record), "a Rig, a fit, a diagnosis or a Record")
+    check_kind("path", path, (str, Path), "the name of a file")
+    suffixes = (".mcap", ".db3", "") if isinstance(thing, Record) else (".yaml", ".yml", "")
+    if Path(path).suffix not in suffixes:
+        raise ParameterError(f"path {quote(str(path))}, expected {' or '.join(suffixes[:2])}")
     if isinstance(thing, Record):
         from msg_adapters.records import write_record
 
         write_record(thing, path, force=force)
-    elif isinstance(thing, (Rig, Fit, Diagnosed)):
-        save_rig(thing if isinstance(thing, Rig) else thing.rig, path, force=force)
     else:
-        raise ParameterError(f"save: {type(thing).__name__}, expected a Rig, a fit, a diagnosis or a Record")
+        save_rig(thing if isinstance(thing, Rig) else thing.rig, path, force=force)
 
 
 def law(data: Record | Sequence[Record], rig: Rig | str, *, progress: Progress | None = None) -> LawResult:
@@ -77,6 +81,11 @@ def experiment(
     from rsea_ros.identification.solver import worker_pools
     from rsea_ros.library.notebook import shown_in_notebook
 
+    check_kind("models", models, Sequence, "two or more rigs or files")
+    check_kind("limits", limits, Mapping, 'limits by name, SI: {"torque": 20.0}')
+    for name, limit in limits.items():
+        check_number(f"limit {name}", limit)
+    check_rate(rate)
     asked = DesignRequest(limits_of(limits), rate, min(0.5, longest), longest)
     hypotheses = hypotheses_from([model_of(load_rig(model)) for model in models])
     with worker_pools() as pools, shown_in_notebook(progress) as tell:
@@ -93,7 +102,6 @@ def design(*, stiffness: float | None = None, unit: str = PAPERS, **demands: flo
     """
     from rsea_ros.design.mechanism import Requirement
     from rsea_ros.design.spring_design import least_stiffness, spring_design
-    from rsea_ros.documents.wording import did_you_mean, quote
 
     known = vars(Requirement())
     for name in demands:
@@ -101,6 +109,9 @@ def design(*, stiffness: float | None = None, unit: str = PAPERS, **demands: flo
             raise ParameterError(
                 f"demand {quote(name)}{did_you_mean(name, known)}, expected one of {', '.join(known)}"
             )
+    for name, value in (demands if stiffness is None else {**demands, "stiffness": stiffness}).items():
+        check_number(name, value)
+    check_kind("unit", unit, str, "the name of a motor and gear")
     requirement, motor = Requirement(**demands), unit_named(unit, None)
     if stiffness is None:
         stiffness = least_stiffness(requirement, motor)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import pickle
+import re
 import subprocess
 import sys
 from types import SimpleNamespace
@@ -163,8 +164,49 @@ def test_arguments_of_the_wrong_kind_are_named(record):
         rsea.predict("paper_high_impedance", "pendulum")
     with pytest.raises(ParameterError, match="save: dict, expected a Rig, a fit"):
         rsea.save({}, "x.yaml")
+    with pytest.raises(ParameterError, match=r"path 'rig.csv', expected .yaml or .yml"):
+        rsea.save(rsea.load_rig("paper_high_impedance"), "rig.csv")
+    with pytest.raises(ParameterError, match=r"path 'run.csv', expected .mcap or .db3"):
+        rsea.save(record, "run.csv")
     with pytest.raises(ParameterError, match="rate = nan Hz"):
         rsea.simulate("paper_high_impedance", [1.0, 2.0], rate=float("nan"))
+
+
+RIG = "paper_high_impedance"
+DOORS = {
+    "read_bag": rsea.read_bag,
+    "simulate a rig": lambda x: rsea.simulate(x, [1.0, 2.0], 280.0),
+    "simulate a command": lambda x: rsea.simulate(RIG, x, 280.0),
+    "simulate at a rate": lambda x: rsea.simulate(RIG, [1.0, 2.0], x),
+    "check": lambda x: rsea.check(x, RIG),
+    "identify": lambda x: rsea.identify(x, RIG),
+    "diagnose": lambda x: rsea.diagnose(x, RIG),
+    "predict": lambda x: rsea.predict(x, RIG),
+    "law": lambda x: rsea.law(x, RIG),
+    "observe": lambda x: rsea.observe(rsea.Observer(rsea.load_rig(RIG)), x),
+    "observe by": lambda x: rsea.observe(x, rsea.simulate(RIG, [1.0, 2.0], 280.0)),
+    "Observer": rsea.Observer,
+    "TorqueController": lambda x: rsea.TorqueController(x, 280.0),
+    "TorqueController at a rate": lambda x: rsea.TorqueController(rsea.load_rig(RIG), x),
+    "closed_loop": lambda x: rsea.closed_loop(x, 280.0, None, [1.0]),
+    "closed_loop by": lambda x: rsea.closed_loop(rsea.load_rig(RIG), 280.0, x, [1.0]),
+    "experiment on": lambda x: rsea.experiment(x, {"torque": 20.0}, rate=280.0),
+    "experiment within": lambda x: rsea.experiment([RIG, RIG], x, rate=280.0),
+    "experiment at a rate": lambda x: rsea.experiment([RIG, RIG], {"torque": 20.0}, rate=x),
+    "design": lambda x: rsea.design(torque=x),
+    "design with a motor": lambda x: rsea.design(unit=x),
+    "design with a spring": lambda x: rsea.design(stiffness=object() if x is None else x),
+    "save": lambda x: rsea.save(x, "nothing.yaml"),
+}
+WRONG = (None, "text", [1], float("nan"), -1.0, {}, {"torque": "much"}, object(), np.ones((2, 2)), True)
+
+
+@pytest.mark.parametrize("door", DOORS)
+@pytest.mark.parametrize("wrong", WRONG, ids=lambda v: type(v).__name__)
+def test_whatever_a_door_is_given_it_says_so_in_its_own_words(door, wrong, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(rsea.RseaError):
+        DOORS[door](wrong)
 
 
 @pytest.mark.parametrize(
@@ -224,6 +266,7 @@ def test_the_studies_answer_as_the_verbs_do(record):
     )
     advice = rsea.experiment(models, {"torque": 20.0}, rate=280.0, longest=2.0)
     assert np.abs(advice.proposal.command).max() <= 20.0
+    assert re.fullmatch(r"Advice\(.*delay.*: a run of [\d.]+ s, 0 pairs that none separates\)", repr(advice))
     with pytest.raises(ParameterError, match="limits: 'torqe', expected one of torque"):
         rsea.experiment(models, {"torqe": 20.0}, rate=280.0)
     assert rsea.__version__ == "0.1.0"

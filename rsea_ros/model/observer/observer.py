@@ -15,6 +15,7 @@ from numba import carray, types  # type: ignore[attr-defined]
 from numba.extending import intrinsic
 
 from rsea_ros.compiler import njit
+from rsea_ros.errors import check_kind
 from rsea_ros.model.observer.assemble import assemble, without_delay
 from rsea_ros.model.observer.filter import LACK, SIGMA, FilterModel, FilterState, inner
 from rsea_ros.model.observer.log import (
@@ -166,6 +167,7 @@ class Observer:
 
     def __init__(self, rig: Rig, noise: Noise | None = None, *, hold: float = math.inf,
                  duration: float = 60.0, learns: bool = True) -> None:  # fmt: skip
+        check_kind("rig", rig, Rig, "a Rig (rsea.load_rig)")
         self._rig, self._delay = without_delay(rig)
         self._noise = noise_of(rig) if noise is None else noise
         self._hold, self._duration, self._learns = hold, duration, learns
@@ -254,6 +256,8 @@ def observe(observer: Observer, record: Record) -> tuple[FloatArray, FloatArray]
     Stamps: those of the F/T samples, or of the positions if there is no sensor, s, shape (n,). Estimates:
     N m, shape (n, 6), in the order of Estimate.
     """
+    check_kind("observer", observer, Observer, "an Observer")
+    check_kind("record", record, Record, "a Record")
     wanted, t, rows = (FT if "ft" in record else STATE), [], []
     for stamp, kind, (a, b) in zip(*(each.tolist() for each in events_of(record)), strict=True):
         if kind == COMMAND:
