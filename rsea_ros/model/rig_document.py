@@ -44,7 +44,7 @@ from rsea_ros.model.rig import (
     check_value,
 )
 from rsea_ros.model.train import TRAINS
-from rsea_ros.records.record import UNITS
+from rsea_ros.records.record import MEASURED, UNITS
 
 _END = {
     "inertia": "inertia of the load",
@@ -200,7 +200,7 @@ _FASTEST = 1000.0
 
 def sensors_from(body: Mapping[str, Any]) -> dict[str, Sensor]:
     """Return the sensors by channel, from the file's `sensors`."""
-    only_keys(body, set(UNITS), "sensors")
+    only_keys(body, set(MEASURED), "sensors")
     sensors = {}
     for name, item in body.items():
         fields = mapping(item, f"sensors.{name}")

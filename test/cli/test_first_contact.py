@@ -5,13 +5,15 @@ from __future__ import annotations
 import argparse
 import importlib
 import shlex
+from dataclasses import replace
 
 import pytest
 
 from rsea_ros.checks.finding import Finding, Findings
 from rsea_ros.cli import main as cli
 from rsea_ros.errors import OutputError
-from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.rig import Sensor
+from rsea_ros.model.rig_file import load_rig, save_rig
 from rsea_ros.outputs.new_files import NewFiles
 from rsea_ros.report.check import check_lines
 
@@ -52,6 +54,11 @@ def test_a_new_rig_is_valid_as_written_and_replaces_nothing(tmp_path, monkeypatc
     assert cli.main(["rig", "check", "left_knee.yaml"]) == 0
     shown = capsys.readouterr().out
     assert "spring.stiffness" in shown and "N·m/rad" in shown and "identify fits: " in shown
+    assert "read late" not in shown
+    late = {**load_rig("left_knee.yaml").sensors, "ft": Sensor(delay=4e-3)}
+    save_rig(replace(load_rig("left_knee.yaml"), sensors=late), "late.yaml")
+    assert cli.main(["rig", "check", "late.yaml"]) == 0
+    assert "read late: ft (4 ms)" in capsys.readouterr().out
 
 
 def test_an_axis_with_a_minus_sign_is_accepted_as_typed(refused):

@@ -33,9 +33,9 @@ class Browser:
 
     def __init__(self, folder):
         self.errors, self.requests = [], []
+        words = [chromium(), *FLAGS, f"--user-data-dir={folder}", "about:blank"]
         self._loop = asyncio.new_event_loop()
         self._number = 0
-        words = [chromium(), *FLAGS, f"--user-data-dir={folder}", "about:blank"]
         self._process = subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         port = _wait_for(lambda: (folder / "DevToolsActivePort").read_text().partition("\n")[0])
         with urllib.request.urlopen(f"http://127.0.0.1:{port}/json") as answer:
