@@ -80,7 +80,7 @@ RIGHT: Mapping[str, tuple[str, ...]] = {
     "damping_drift": ("speed and time",),
     "dead_zone": ("command",),
     "directional_load_friction": ("speed and load", "speed and command"),
-    "encoder_delay": ("speed, at the encoder",),
+    "encoder_delay": ("command's past",),
     "encoder_eccentricity": ("position, periodic, at the encoder",),
     "ft_bias": ("a constant, at the sensor",),
     "ft_delay": ("the sensor's past",),

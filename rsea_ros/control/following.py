@@ -12,10 +12,10 @@ import numpy as np
 from rsea_ros.control.controller import ControllerSettings, Measurement, TorqueController, TorqueLimits
 from rsea_ros.control.synthesis import ControllerDesign
 from rsea_ros.control.uncertainty import lock
-from rsea_ros.errors import ParameterError, check_kind
+from rsea_ros.errors import ParameterError, check_kind, check_rate
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.simulation import Plant, PlantSample
-from rsea_ros.records.record import ComplexArray, FloatArray
+from rsea_ros.records.record import ComplexArray, FloatArray, torques_from
 
 
 @dataclass(frozen=True)
@@ -52,14 +52,12 @@ def closed_loop(
     """Run a controller on a simulated rig from rest. desired: N m at the samples, shape (n,).
 
     A command that is computed at a sample acts from the next one on: one sample of delay. late: samples
-    more. Raises ParameterError for a controller of another rate.
+    more. Raises ParameterError for a controller of another rate, and for arguments of another kind.
     """
     check_kind("rig", rig, Rig, "a Rig (rsea.load_rig)")
+    check_rate(rate)
     check_kind("controller", controller, TorqueController, "a TorqueController")
-    desired = np.asarray(desired)
-    if desired.dtype.kind not in "iuf" or desired.ndim != 1 or not np.isfinite(desired).all():
-        kind = f"shape {desired.shape} of {desired.dtype}"
-        raise ParameterError(f"desired: {kind}, expected (n,) finite torques in N·m")
+    desired = torques_from("desired", desired, 1)
     if controller.rate != rate:
         raise ParameterError(f"rate = {rate} Hz, expected that of the controller, {controller.rate} Hz")
     plant = Plant(rig, rate, noise=noise)
@@ -71,9 +69,7 @@ def closed_loop(
         rows[k] = sample.ft, command, sample.velocity
         sample = plant.step(pending.pop(0))
         pending.append(command)
-    return ControlTrace(
-        np.arange(len(desired)) / rate, desired, rows[:, 0], rows[:, 1], rows[:, 2]
-    )
+    return ControlTrace(np.arange(len(desired)) / rate, desired, rows[:, 0], rows[:, 1], rows[:, 2])
 
 
 def reading(sample: PlantSample) -> Measurement:

@@ -10,6 +10,7 @@ from rsea_ros.diagnosis.score import Score, score_on
 from rsea_ros.diagnosis.settings import DEFAULT, BlockSettings, DiagnosisSettings
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.effects.effect import Effect
+from rsea_ros.effects.signal_table import sensor_of
 from rsea_ros.identification.noise_level import reestimate_noise
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Map, Solution, serial, solve
@@ -77,21 +78,16 @@ def with_clocks(problem: Problem, theta: FloatArray, model: Problem) -> tuple[Pr
     return larger, np.concatenate([theta, np.zeros(len(clocks))])
 
 
-def _sensor(channel: str) -> str:
-    """Return the sensor of a channel: the velocity is that of the encoder."""
-    return "position" if channel == "velocity" else channel
-
-
 def is_apart(effect: Effect, model: Problem) -> bool:
-    """Return whether a model does not already have an effect under another name.
+    """Return whether data can tell an effect from those that a model has.
 
-    What is common to all sensors is a delay of the command, never each of them late. Of one sensor alone the
-    motor's measured torque tells it.
+    A delay of all sensors is the command's: where all others are late, the last one cannot be. Beside a
+    single sensor the motor's measured torque tells which of the two it is.
     """
     if "late" not in effect.tags:
         return True
     late = {e.sensor for e in map(effect_named, model.acting) if "late" in e.tags}
-    sensors = {_sensor(channel) for case in model.cases for channel in case.measured}
+    sensors = {sensor_of(channel) for case in model.cases for channel in case.measured}
     return bool(sensors - late - {effect.sensor} - ({"motor_torque"} if late else set()))
 
 
@@ -110,21 +106,21 @@ def with_clocks_in_delays(solution: Solution) -> FloatArray | None:
     clocks = [i for i, u in enumerate(unknowns) if u.is_clock and not u.is_rate]
     if not clocks or not (command or late):
         return None
-    sensors = [_sensor(unknowns[i].name.split(".")[1]) for i in clocks]
+    sensors = [sensor_of(unknowns[i].name.split(".")[1]) for i in clocks]
     theta = solution.theta.copy()
     for sensor, at in late.items():
         own = [i for i, n in zip(clocks, sensors, strict=True) if n == sensor]
-        theta[at] -= _shared(theta, own)
+        theta[at] -= _take_common(theta, own)
     others = [i for i, n in zip(clocks, sensors, strict=True) if n not in late]
     if command and others:
-        common = _shared(theta, others)
+        common = _take_common(theta, others)
         theta[command] -= common
         theta[list(late.values())] += common
     return np.asarray(theta)
 
 
-def _shared(theta: FloatArray, places: list[int]) -> float:
-    """Return what some clocks have in common, s, and take it from them."""
+def _take_common(theta: FloatArray, places: list[int]) -> float:
+    """Take from some clocks what they have in common, and return it, s."""
     common = float(np.mean(theta[places])) if places else 0.0
     theta[places] -= common
     return common

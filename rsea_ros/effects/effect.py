@@ -18,7 +18,7 @@ from rsea_ros.documents.units import with_unit
 from rsea_ros.documents.wording import quote
 from rsea_ros.effects.guess import Guess, Guesses
 from rsea_ros.effects.parameter import Parameter as Parameter, Scale
-from rsea_ros.effects.signal_table import Port
+from rsea_ros.effects.signal_table import Port, sensor_of
 from rsea_ros.errors import ParameterError
 
 _POINTER = types.CPointer(types.float64)  # type: ignore[no-untyped-call]
@@ -147,8 +147,8 @@ class Effect:
 
     @property
     def sensor(self) -> str:
-        """Return the channel in which an effect at a sensor acts: the F/T's or the encoder's."""
-        return "position" if self.claims.channel in ("position", "velocity") else "ft"
+        """Return the channel of the sensor in which an effect at a sensor acts: `ft` or `position`."""
+        return sensor_of(self.claims.channel)
 
     @property
     def null(self) -> dict[str, float]:

@@ -7,6 +7,11 @@ The step fills the signals to be read, calls the effects that are on, and uses t
 from enum import IntEnum
 
 
+def sensor_of(channel: str) -> str:
+    """Return the channel that names a channel's sensor: one encoder reads position and velocity."""
+    return "position" if channel == "velocity" else channel
+
+
 class Port(IntEnum):
     """Where in the chain an effect acts; the step calls the ports in this order.
 

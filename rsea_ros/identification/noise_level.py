@@ -19,6 +19,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from rsea_ros.effects.signal_table import sensor_of
 from rsea_ros.identification.noise import (
     HANN,
     OVERLAP,
@@ -35,8 +36,6 @@ from rsea_ros.records.record import ComplexArray, FloatArray, IntArray
 
 _SHARP = 0.05
 """Of a signal's RMS: the width of its sign's step."""
-_ONE_SENSOR = frozenset({"position", "velocity"})
-"""Channels that one encoder makes: their noise agrees."""
 
 
 def witnesses(
@@ -45,7 +44,7 @@ def witnesses(
     """Yield signals at the stamps of a channel. outputs: simulated. ratio: of the gear, rotor over output."""
     t = case.t[channel]
     for n in case.measured.keys() & outputs.keys():
-        if n != channel and {n, channel} != _ONE_SENSOR:
+        if sensor_of(n) != sensor_of(channel):  # the noise of one encoder's channels agrees
             residual = np.where(case.mask[n], case.measured[n] - outputs[n], 0.0)
             yield np.interp(t, case.t[n], residual)
     command, q, v, load = _motion(case, outputs, t)

@@ -13,7 +13,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from rsea_ros.errors import ParameterError
+from rsea_ros.errors import ParameterError, check_kind
 from rsea_ros.identification.result import ParameterEstimate
 from rsea_ros.progress import Progress
 from rsea_ros.records.record import MEASURED, Channel, Record, pandas_for
@@ -73,11 +73,9 @@ def plain(table: Table) -> str:
 
 def records_of(data: Record | Sequence[Record]) -> list[Record]:
     """Return one or several records as a list. Raises ParameterError for anything else."""
-    items: list[object] = list(data) if isinstance(data, Iterable) else [data]
-    records = [item for item in items if isinstance(item, Record)]
-    if len(records) < len(items):
-        kind = next(type(item).__name__ for item in items if not isinstance(item, Record))
-        raise ParameterError(f"data: {kind}, expected a Record (Record.from_arrays, rsea.read_bag)")
+    records = list(data) if isinstance(data, Iterable) else [data]
+    for record in records:
+        check_kind("data", record, Record, "a Record (Record.from_arrays, rsea.read_bag)")
     if len({id(record) for record in records}) < len(records):
         raise ParameterError("data: a record is given twice, expected each record once")
     if not records:

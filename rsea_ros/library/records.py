@@ -13,7 +13,7 @@ from rsea_ros.errors import ParameterError, check_kind, check_rate
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
-from rsea_ros.records.record import Channel, Record
+from rsea_ros.records.record import Channel, Record, torques_from
 
 
 def read_bag(
@@ -32,7 +32,7 @@ def read_bag(
     Raises BagError with file, topic, field, value and expected value.
     Not to be confused with `rsea import`, which converts tables to bags.
     """
-    for each in [path] if isinstance(path, (str, Path)) or not isinstance(path, Sequence) else path:
+    for each in path if isinstance(path, Sequence) and not isinstance(path, str) else [path]:
         check_kind("path", each, (str, Path), "a bag: a directory, an .mcap or a .db3 file")
     return read_record(path, topics=TopicMap(namespace=namespace, joint=joint, axis=axis), strict=strict)
 
@@ -44,15 +44,10 @@ def simulate(
 
     command: motor torque at the gear output, N m, shape (n,); for a rig with a position loop the target, rad.
     rate: of the commands, Hz. seed: of the sensor noise. noise: False for perfect sensors. Measurements are
-    stamped at the end of each hold, commands at its beginning. Raises ParameterError for a command or rate
-    that is none.
+    stamped at the end of each hold, commands at its beginning. Raises ParameterError for no command or rate.
     Not to be confused with predict, which simulates the commands of a record and compares the result.
     """
-    given = np.asarray(command)
-    if given.dtype.kind not in "iuf" or given.ndim != 1 or len(given) < 2 or not np.isfinite(given).all():
-        kind = f"shape {given.shape} of {given.dtype}"
-        raise ParameterError(f"command: {kind}, expected (n,) finite torques in N·m with n >= 2 samples")
-    values = given.astype(np.float64)
+    values = torques_from("command", command, 2)
     if rate is None:
         raise ParameterError("rate: not stated, expected that of the commands, Hz")
     check_rate(rate)

@@ -85,6 +85,7 @@ def experiment(
     check_kind("limits", limits, Mapping, 'limits by name, SI: {"torque": 20.0}')
     for name, limit in limits.items():
         check_number(f"limit {name}", limit)
+    check_number("longest", longest)
     check_rate(rate)
     asked = DesignRequest(limits_of(limits), rate, min(0.5, longest), longest)
     hypotheses = hypotheses_from([model_of(load_rig(model)) for model in models])

@@ -338,6 +338,16 @@ def _vector(name: str, values: npt.ArrayLike, source: str) -> FloatArray:
     return filled
 
 
+def torques_from(name: str, values: npt.ArrayLike, fewest: int) -> FloatArray:
+    """Return torques at the samples, N m, shape (n,). Raises ParameterError for what is none, or too few."""
+    given = np.asarray(values)
+    is_vector = given.dtype.kind in "iuf" and given.ndim == 1
+    if not (is_vector and len(given) >= fewest and np.isfinite(given).all()):
+        expected = f"(n,) finite torques in N·m with n >= {fewest} samples"
+        raise ParameterError(f"{name}: shape {given.shape} of {given.dtype}, expected {expected}")
+    return given.astype(np.float64)
+
+
 def _check_finite(name: str, unit: str, values: FloatArray, source: str) -> None:
     for k in np.flatnonzero(~np.isfinite(values))[:1]:
         raise ChannelError(f"{source}: {name}[{k}] = {values[k]}, expected a finite value in {plain(unit)}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 import os
 import pickle
@@ -15,6 +16,7 @@ import pytest
 
 import rsea_ros as rsea
 from rsea_ros import DOOR
+from rsea_ros.control.law import Gains
 from rsea_ros.errors import ChannelError, ParameterError
 from rsea_ros.records.record import Channel
 
@@ -173,6 +175,14 @@ def test_arguments_of_the_wrong_kind_are_named(record):
 
 
 RIG = "paper_high_impedance"
+LATE = [rsea.load_rig(RIG).with_effect(name) for name in ("current_loop_lag", "command_delay")]
+
+
+@functools.cache
+def controller() -> rsea.TorqueController:
+    return rsea.TorqueController(rsea.load_rig(RIG), 280.0, Gains(0.2575, 0.003029, 1.195, 6.99, 42.9))
+
+
 DOORS = {
     "read_bag": rsea.read_bag,
     "simulate a rig": lambda x: rsea.simulate(x, [1.0, 2.0], 280.0),
@@ -188,11 +198,16 @@ DOORS = {
     "Observer": rsea.Observer,
     "TorqueController": lambda x: rsea.TorqueController(x, 280.0),
     "TorqueController at a rate": lambda x: rsea.TorqueController(rsea.load_rig(RIG), x),
-    "closed_loop": lambda x: rsea.closed_loop(x, 280.0, None, [1.0]),
+    "closed_loop": lambda x: rsea.closed_loop(x, 280.0, controller(), [1.0]),
+    "closed_loop at a rate": lambda x: rsea.closed_loop(rsea.load_rig(RIG), x, controller(), [1.0]),
     "closed_loop by": lambda x: rsea.closed_loop(rsea.load_rig(RIG), 280.0, x, [1.0]),
+    "closed_loop to": lambda x: rsea.closed_loop(
+        rsea.load_rig(RIG), 280.0, controller(), [] if isinstance(x, list) else x
+    ),
     "experiment on": lambda x: rsea.experiment(x, {"torque": 20.0}, rate=280.0),
-    "experiment within": lambda x: rsea.experiment([RIG, RIG], x, rate=280.0),
-    "experiment at a rate": lambda x: rsea.experiment([RIG, RIG], {"torque": 20.0}, rate=x),
+    "experiment within": lambda x: rsea.experiment(LATE, x, rate=280.0),
+    "experiment at a rate": lambda x: rsea.experiment(LATE, {"torque": 20.0}, rate=x),
+    "experiment for": lambda x: rsea.experiment(LATE, {"torque": 20.0}, rate=280.0, longest=x),
     "design": lambda x: rsea.design(torque=x),
     "design with a motor": lambda x: rsea.design(unit=x),
     "design with a spring": lambda x: rsea.design(stiffness=object() if x is None else x),
@@ -205,7 +220,7 @@ WRONG = (None, "text", [1], float("nan"), -1.0, {}, {"torque": "much"}, object()
 @pytest.mark.parametrize("wrong", WRONG, ids=lambda v: type(v).__name__)
 def test_whatever_a_door_is_given_it_says_so_in_its_own_words(door, wrong, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(rsea.RseaError):
+    with pytest.raises(rsea.RseaError, match=r"expected|no such bag"):
         DOORS[door](wrong)
 
 
