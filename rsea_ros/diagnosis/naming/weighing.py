@@ -23,8 +23,9 @@ from rsea_ros.diagnosis.candidate import (
     FitSetup,
     effect_size,
     fit_candidate,
+    is_apart,
     prior_cost,
-    refit,
+    without_effect,
 )
 from rsea_ros.diagnosis.data_split import TRAIN, VALIDATION
 from rsea_ros.diagnosis.evaluation import Evaluated, HeldOut, Selection, Trial
@@ -33,7 +34,8 @@ from rsea_ros.diagnosis.score import Score, tempered_loss
 from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.identification.confidence import confidence_of, is_off_rig
-from rsea_ros.identification.solver import Pools, Solution
+from rsea_ros.identification.solver import Pools, Solution, power
+from rsea_ros.identification.unknowns import theta_with
 from rsea_ros.records.record import FloatArray
 from rsea_ros.records.statistics import Z95
 
@@ -91,7 +93,7 @@ def weigh_rivals(
     trust = 0.0 if is_off_rig(selection.last.solution) else 1.0
     scores, weights = _race(tried, held_out, pools, settings, trust)
     if sum(w >= rule.close_weight for w in weights) > 1:
-        tried = _with_close_ones_fitted(tried, weights, claim, selection, pools)
+        tried = _beside_all_causes(tried, weights, claim, selection, pools)
         tried = _in_the_open(tried, claim.name, near)
         scores, weights = _race(tried, held_out, pools, settings, trust)
     weight_of = {t.name: w for t, w in zip(tried, weights, strict=True)}
@@ -124,23 +126,25 @@ def _race(
     return scores, _stack(scores, priors, [effect_size(t.name) for t in tried], settings)
 
 
-def _with_close_ones_fitted(
+def _beside_all_causes(
     tried: Sequence[Trial], weights: Sequence[float], claim: Claim, selection: Selection, pools: Pools
 ) -> list[Trial]:
-    """Return trials, those of some weight fitted to the end, but no larger law that may be a smaller one."""
+    """Return a cause and the trials of some weight, each fitted to the end beside all the other causes.
+
+    What came later still hid in the residual when these were tried. No larger law that may be a smaller one.
+    """
     least = selection.last.settings.evidence.close_weight
-    fitted = [t for t, w in zip(tried, weights, strict=True) if w >= least]
-    models = pools.fits.map(lambda t: _fit_to_the_end(t, selection, pools), fitted)
-    ends = {t.name: m for t, m in zip(fitted, models, strict=True)}
-    nested = {
-        name for name, model in ends.items()
-        if effect_size(name) > effect_size(claim.name) and may_be_less(model.solution, name)
-    }  # fmt: skip
-    return [
-        replace(t, problem=ends[t.name].problem, theta=ends[t.name].solution.theta) if t.name in ends else t
-        for t in tried
-        if t.name not in nested
-    ]
+    rest, _ = without_effect(claim.problem, claim.theta, claim.name)
+    mine = [replace(t, problem=claim.problem, theta=claim.theta) for t in tried if t.name == claim.name]
+    close = [
+        t for t, w in zip(tried, weights, strict=True)
+        if w >= least and t.name != claim.name and is_apart(effect_named(t.name), rest)
+    ]  # fmt: skip
+    models = list(pools.fits.map(lambda t: _in_place_of(claim, t, selection, pools).solution, close))
+    ends = [replace(t, problem=m.problem, theta=m.theta) for t, m in zip(close, models, strict=True)]
+    is_more = [effect_size(t.name) > effect_size(claim.name) for t in close]
+    nested = [more and may_be_less(m, m.problem.newest) for more, m in zip(is_more, models, strict=True)]
+    return [*mine, *(t for t, is_nested in zip(ends, nested, strict=True) if not is_nested)]
 
 
 def may_be_less(solution: Solution, name: str) -> bool:
@@ -157,16 +161,29 @@ def may_be_less(solution: Solution, name: str) -> bool:
     )
 
 
-def _fit_to_the_end(trial: Trial, selection: Selection, pools: Pools) -> Candidate:
-    """Return a trial fitted as the models that are tested: the steps of the search stop far earlier.
+def _in_place_of(claim: Claim, trial: Trial, selection: Selection, pools: Pools) -> Candidate:
+    """Return the last model with a trial's effect in the place of a cause, fitted as those that are tested.
 
-    Nearly equal laws need long fits: the values of one compensate for the other.
+    The steps of the search stop far earlier: nearly equal laws need long fits, the values of one compensate
+    for the other.
     """
-    settings = selection.last.settings
+    settings, last = selection.last.settings, selection.last
     blocks, gain = (*TRAIN, *VALIDATION), settings.fits.final_gain
-    setup = FitSetup(selection.cases, settings, pools.run, blocks=blocks, gain=gain)
-    initial = fit_candidate(replace(setup, iterations=0), trial.problem, trial.theta)
-    return refit(initial, setup)
+    setup = FitSetup(selection.cases, settings, pools.run, last.validation, blocks=blocks, gain=gain)
+    problem, theta = without_effect(claim.problem, claim.theta, claim.name)
+    reached = list(zip(trial.problem.unknowns, trial.theta, strict=True))
+    own = [(u, float(at)) for u, at in reached if u.name.startswith(trial.name + ".")]
+    (effect,) = (e for e in trial.problem.rig.effects if e.name == trial.name)
+    problem = replace(
+        problem,
+        rig=problem.rig.with_effects(*problem.rig.effects, effect),
+        unknowns=(*problem.unknowns, *(u for u, _ in own)),
+        newest=trial.name,
+    )
+    theta = np.array([*theta, *(at for _, at in own)])
+    values = {u.name: u.outer(float(at)) for u, at in reached}
+    starts, masked = (theta, theta_with(problem.unknowns, theta, values)), setup.mask(problem)
+    return fit_candidate(setup, problem, min(starts, key=lambda t: power(masked.residual(t))))
 
 
 def _stack(
