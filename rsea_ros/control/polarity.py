@@ -13,6 +13,7 @@ from rsea_ros.control.controller import Measurement
 from rsea_ros.control.sign_change import SignChange
 from rsea_ros.control.sign_evidence import DOUBT, MOVED, POWER, RIGHT, SIGNS, SWAY, SignEvidence
 from rsea_ros.model.rig import Rig
+from rsea_ros.records.record import HUGE, is_measured
 
 PULSE, PART = 4.0, 0.06
 """N m of a pulse beyond the torque at which the gear breaks away; part of the torque limit that it is at
@@ -41,7 +42,7 @@ EXPLAINED = 0.4
 SENT = 4
 """Commands that a measured motor torque may belong to."""
 FROZEN, STUCK = 0.02, 0.5
-"""s for which joint_states repeat one value, and of PULSE by which the command has changed meanwhile."""
+"""s for which joint_states repeat one value, and of PULSE what they should have followed meanwhile."""
 TIMES = 2.5
 """Times the command that the motor torque may be."""
 REVERSED = {
@@ -60,6 +61,7 @@ class Polarity:
     def __init__(self, rig: Rig, rate: float, limit: float) -> None:
         """rate: Hz. limit: the largest torque, N m."""
         self._h, self._pulse = 1.0 / rate, min(PULSE, PART * limit)
+        self._stiffness = rig["spring.stiffness"]
         self._stiffest = max(self._pulse, STIFFEST * limit)
         self._seen = SignEvidence(rig, rate, self._pulse)
         self._change = SignChange(rig, rate, (self._seen.ft_noise, self._seen.noise))
@@ -107,9 +109,8 @@ class Polarity:
         self._made = [self._seen.made[1], *self._made[:-1]]
         before, self._state = self._state, (reading.position, reading.velocity, reading.motor_torque)
         self._alike = self._alike + 1 if self._state == before else 0
-        acted = [self._sent[-1], *(self._asked if self._alike else ())]
-        self._asked = min(acted), max(acted)
-        if self._alike * self._h > FROZEN and self._asked[1] - self._asked[0] > STUCK * self._pulse:
+        left_behind = self._left_behind(reading)
+        if self._alike * self._h > FROZEN and left_behind > STUCK * self._pulse:
             self._contradict("joint_states repeat one value")
         if self.contradiction:
             return self.contradiction
@@ -133,6 +134,16 @@ class Polarity:
             made = f"motor torque is {self._made[0]:.3g} N·m, ft {ft:.3g}, J w' + b w {motion:.3g}"
             self._contradict(self._unless_frozen(f"{made}, as with another gain or with {name} reversed"))
         return self.contradiction
+
+    def _left_behind(self, reading: Measurement) -> float:
+        """Return what repeating states did not follow, N m: motor torque its command, position its velocity.
+
+        Without a motor torque a gear that sticks repeats rightly, whatever is commanded.
+        """
+        acted = [self._sent[-1], *(self._asked if self._alike else ())]
+        self._asked = min(acted), max(acted)
+        asked = self._asked[1] - self._asked[0] if is_measured(reading.motor_torque, HUGE) else 0.0
+        return max(asked, self._stiffness * abs(reading.velocity) * self._alike * self._h)
 
     def _unless_frozen(self, words: str) -> str:
         """Return words on what changed; a signal that stands still beside one that moves looks so, too."""

@@ -179,6 +179,24 @@ def test_states_that_stand_still_are_named_and_not_the_sensor_that_is_right(rig,
     assert "joint_states repeat one value" in polarity.contradiction and k < 285 + 20
 
 
+@pytest.mark.parametrize(("velocity", "told"), [(0.0, False), (0.05, False), (0.5, True)])
+def test_without_a_motor_torque_states_that_repeat_are_frozen_only_where_they_say_that_they_move(
+    velocity, told
+):
+    """A gear that sticks was "joint_states repeat one value" whenever the command changed by 2 N m.
+
+    K w t = 248 * 0.5 * 0.02 = 2.5 N m of spring in 20 ms, 0.25 at a tenth of that speed.
+    """
+    polarity = Polarity(RIG, RATE, LIMIT)
+    polarity.proven = True
+    reading = Measurement(0.0, velocity, 0.1)
+    words = ""
+    for k in range(8):
+        words = polarity.watch(reading)
+        polarity.sent(3.0 * k)
+    assert ("joint_states repeat one value" in words) is told
+
+
 def test_a_blow_to_a_free_load_is_no_changed_sign():
     """ft goes from 2 to -2 N m in a sample, and the gear feels it."""
     change, damping = SignChange(FREE, RATE, (0.03, 0.1)), FREE["rotor.reflected_damping"]
