@@ -128,7 +128,8 @@ def _against_rig(checked: Checked, rig: Rig, axis: str, values: bool) -> list[Fi
             if cleared is not None and cleared.is_clear:
                 return again
         if linear is not None:
-            return _with_drifts(findings, rig_findings.drift_findings(lines))
+            drifts = rig_findings.drift_findings(checked.record, lines, checked.pairs)
+            return _with_drifts(findings, drifts)
     return findings
 
 

@@ -112,6 +112,28 @@ class Pair:
     unrelated: bool = False
 
 
+def predicted(record: Record, pair: Pair, name: str) -> FloatArray | None:
+    """Return a channel that a law gives from the others at its stamps, shape (n,).
+
+    None for another channel, one that is absent, and a law that integrates. Coefficients that the pair
+    leaves open are those of the rig.
+    """
+    law = pair.law
+    used = {law.x, law.y, law.less or law.y}
+    if name not in (law.y, law.less) or law.powers[0] < 0 or not used <= record.channels.keys():
+        return None
+    ratios = pair.ratios or (1.0,) * len(law.powers)
+    x, given = record[law.x], np.zeros(len(record[law.x]))
+    for power, stated, ratio in zip(law.powers, law.expected, ratios, strict=True):
+        values = x.y
+        for _ in range(power):
+            values = np.gradient(values, x.t)
+        given += stated * (ratio if math.isfinite(ratio) else 1.0) * values
+    t, y = record[name].t, record[law.y]
+    at = np.interp(t, x.t, given)
+    return at if name == law.y else np.interp(t, y.t, y.y) - at
+
+
 def is_held(rig: Rig) -> bool:
     """Return whether the output is held behind the spring, so that position, deflection and F/T are one."""
     try:

@@ -4,8 +4,8 @@ Values are those of a fit without gains: the linearised fit leaves them free, wh
 
 A sensor's clock may run so fast or slow that the phases turn within the record. The lag behind the rig's
 simulation, followed from second to second (identification/clocks.py), says how fast; taken out, the rest is
-small enough for the linearised fit. Where the rig misfits even so, the line itself is the number: a cause in
-the machine moves the lags of all sensors, a clock only those of its sensor.
+small enough for the linearised fit. Where the rig misfits even so, a cause bends the lags of all sensors: the
+lag of ft behind the joint's own motion is the number then.
 
 Another machine than a rig without a spring states shows in the torque that acted, by least squares along the
 measured motion, without and with restoring terms:
@@ -22,9 +22,10 @@ import numpy as np
 from rsea_ros.checks.expected import Side
 from rsea_ros.checks.finding import Finding, Light
 from rsea_ros.checks.linearised_rig import BESIDE, LinearisedFit, Number
+from rsea_ros.checks.pairs import Pair, predicted
 from rsea_ros.checks.verdicts import RIGHT_RIG
 from rsea_ros.errors import RseaError
-from rsea_ros.identification.clocks import BLOCK, LEAST_RISE, SCATTER, LagLine, lag_line
+from rsea_ros.identification.clocks import LEAST_RISE, SCATTER, LagLine, lag_line
 from rsea_ros.identification.confidence import FAR, confidence_of, off_rig, parameters_of
 from rsea_ros.identification.fit import reweight
 from rsea_ros.identification.result import ParameterEstimate, Remark
@@ -152,10 +153,6 @@ def _far(remark: Remark, rig: Rig) -> Finding:
 
 _STEEPEST = 1.8e-3
 """s/s. The lag is followed from block to block up to 2 ms/s; no line near that is trusted."""
-_STRAIGHT = 0.2
-"""As SCATTER, beside a misfit of the rig."""
-
-
 def lag_lines(compared: Mapping[str, Side], start: float) -> dict[str, LagLine]:
     """Return the line through the lags of every sensor that shows one. start: of the record, s."""
     lines = {n: lag_line(s.t, s.y, s.p, start) for n, s in compared.items() if n in SENSED}
@@ -164,30 +161,60 @@ def lag_lines(compared: Mapping[str, Side], start: float) -> dict[str, LagLine]:
 
 def clock_rates(lines: Mapping[str, LagLine]) -> dict[str, float]:
     """Return the rate (s/s) at which channels come later and later than predicted, where a line shows it."""
-    return {n: line.rate for n, line in lines.items() if _rises(line, SCATTER)}
+    clear = {n: line for n, line in lines.items() if line.scatter < SCATTER * abs(line.rise)}
+    return {n: line.rate for n, line in clear.items() if _rises(line)}
 
 
-def _rises(line: LagLine, scatter: float) -> bool:
-    """Return whether a line rises too far for a linear fit, and its lags scatter less than a part of that."""
-    steep = abs(line.rise) > LEAST_RISE and abs(line.rate) < _STEEPEST
-    return steep and line.scatter < scatter * abs(line.rise)
+def _rises(line: LagLine) -> bool:
+    """Return whether a line rises too far for a linear fit, and no faster than clocks run."""
+    return abs(line.rise) > LEAST_RISE and abs(line.rate) < _STEEPEST
 
 
-def drift_findings(lines: Mapping[str, LagLine]) -> list[Finding]:
-    """Return the drifts that lines show where the rig misfits, those that a sensor has alone in amber."""
-    return [_drift_of(n, line, lines) for n, line in lines.items() if _rises(line, _STRAIGHT)]
+_PLAINLY = 0.25
+"""Of what the lines behind the rig are off if the drift is ft's: if it is the joint's, for it to be that."""
 
 
-def _drift_of(name: str, line: LagLine, lines: Mapping[str, LagLine]) -> Finding:
-    """Return the finding of one line; its doubt holds what the machine does to the other sensors."""
-    others = [other.rate for n, other in lines.items() if (n in JOINT) != (name in JOINT)]
-    duration = abs(line.rise / line.rate)
-    of_line = line.scatter / duration * math.sqrt(12.0 * BLOCK / duration)
-    doubt = float(np.hypot(of_line, max(map(abs, others), default=abs(line.rate))))
-    alone = abs(line.rate) > SURE * doubt
-    light: Light = "amber" if alone else "green"
-    beside = "seen beside a misfit of the rig" + ("" if alone else ", for which a cause may stand in for it")
-    return drift_finding(light, name, Number(line.rate, doubt), duration, beside)
+def drift_findings(record: Record, lines: Mapping[str, LagLine], pairs: Sequence[Pair]) -> list[Finding]:
+    """Return the drifts that lags show where the rig misfits; amber needs two channels that agree on it.
+
+    Behind a rig that misfits the lag of every sensor bends along the record. That of ft behind the joint's
+    own motion hardly does: where it rises its line is the number, of ft, unless joint_states plainly run
+    otherwise than the command.
+    """
+    between = [(p.law.x, line) for p in pairs if p.law.x != "ft" for line in _behind(record, p, "ft")]
+    x, line = min(between, key=lambda one: one[1].scatter, default=("", None))
+    if line is None or not _is_straight(line):
+        beside = "seen beside a misfit of the rig, for which a cause may stand in for it"
+        straight = {n: one for n, one in lines.items() if _is_straight(one)}
+        return [_drift_of("green", n, one, one.rate, abs(one.rate), beside) for n, one in straight.items()]
+    echoes = [one.rate for p in pairs if p.law.x == "command" for one in _behind(record, p, "motor_torque")]
+    joint = echoes[0] if echoes else lines[x].rate if x in lines else 0.0
+    off = joint + line.rate if echoes else lines["ft"].rate if "ft" in lines else 0.0
+    is_joint = abs(off) + abs(joint + line.rate) < _PLAINLY * (abs(off - line.rate) + abs(joint))
+    names = [n for n in lines if n == x or {n, x} <= set(JOINT)] if is_joint else ["ft"]
+    rate = -line.rate if is_joint else line.rate
+    return [_drift_of("amber", n, line, rate, _bend(line), f"seen between ft and {x}") for n in names]
+
+
+def _behind(record: Record, pair: Pair, name: str) -> Iterator[LagLine]:
+    """Yield the line of a channel's lag behind what a pair makes of the other, where there is one."""
+    expected = predicted(record, pair, name)
+    if expected is not None:
+        line = lag_line(record[name].t, record[name].y, expected, float(record["command"].t[0]))
+        yield from [] if line is None else [line]
+
+
+def _is_straight(line: LagLine) -> bool:
+    return _rises(line) and abs(line.rate) > SURE * _bend(line)
+
+
+def _bend(line: LagLine) -> float:
+    """Return the rate (s/s) that a line of its scatter would have if all of that were a bend."""
+    return line.scatter * math.sqrt(12.0) / abs(line.rise / line.rate)
+
+
+def _drift_of(light: Light, name: str, line: LagLine, rate: float, doubt: float, beside: str) -> Finding:
+    return drift_finding(light, name, Number(rate, doubt), abs(line.rise / line.rate), beside)
 
 
 def at_rates(record: Record, rates: Mapping[str, float]) -> Record:
