@@ -249,8 +249,14 @@ def naming_of(
     places: Sequence[CauseAndRivals], stages: Sequence[Evaluated], settings: DiagnosisSettings
 ) -> dict[str, Named]:
     """Return the naming of each cause."""
-    at_floor = is_at_floor(stages[-1].test, settings.floor)
-    return {n.cause.evidence.name: n for n in name_causes(places, at_floor, settings)}
+    at_floor, needed = is_at_floor(stages[-1].test, settings.floor), on_the_way(stages, settings)
+    return {n.cause.evidence.name: n for n in name_causes(places, at_floor, needed, settings)}
+
+
+def on_the_way(stages: Sequence[Evaluated], settings: DiagnosisSettings) -> set[str]:
+    """Return the causes without which more than noise is left, where all together leave only that."""
+    *before, last = (is_at_floor(stage.test, settings.floor) for stage in stages)
+    return {stage.added for stage, reached in zip(stages[1:], before, strict=True) if last and not reached}
 
 
 def with_sure_gains(
@@ -260,10 +266,9 @@ def with_sure_gains(
 
     Except on the way to nothing but noise: of two that act together each may gain nothing alone.
     """
-    reached = [is_at_floor(stage.test, settings.floor) for stage in stages]
-    steps = zip(itertools.pairwise(stages), reached, strict=False)
-    needless = [step for step, before in steps if before or not reached[-1]]
-    gains = {step[1].added: own_gain(step, channel, settings) for step in needless}
+    needed = on_the_way(stages, settings)
+    steps = [step for step in itertools.pairwise(stages) if step[1].added not in needed]
+    gains = {step[1].added: own_gain(step, channel, settings) for step in steps}
     unsure = {name for name, (_, _, (low, _)) in gains.items() if not low > 0.0}
     return {
         name: replace(by, status=None, has_gain=False) if name in unsure else by

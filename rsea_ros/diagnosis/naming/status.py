@@ -2,7 +2,7 @@
 
 A cause and its rivals share the probability that one of them is right; the rest is "none of these". A cause
 that surely takes a material part is named unless "none of these" is four times as likely; one that helps
-less, where it is likelier than that. Causes that together leave only noise are always named, but as
+less, where it is likelier than that. Causes without which more than noise is left are always named, but as
 `confirmed` only where they are likely.
 
 p = 1 / (1 + exp(-(a_0 + sum_i a_i f_i)))
@@ -15,7 +15,7 @@ Written by `python -m bench calibration fit`, from records of the project's own 
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
@@ -101,18 +101,22 @@ class Named:
 def name_causes(
     places: Sequence[CauseAndRivals],
     at_floor: bool,
+    needed: Collection[str],
     settings: DiagnosisSettings = DEFAULT,
 ) -> list[Named]:
     """Return the naming of the cause in each place.
 
-    at_floor: all causes together leave only noise (criteria.py).
+    at_floor: all causes together leave only noise (criteria.py). needed: the causes for which they do.
     """
-    return [_name_one(p, at_floor, settings) for p in places]
+    return [_name_one(p, at_floor, p.cause.evidence.name in needed, settings) for p in places]
 
 
-def _name_one(place: CauseAndRivals, at_floor: bool, settings: DiagnosisSettings) -> Named:
+def _name_one(
+    place: CauseAndRivals, at_floor: bool, is_needed: bool, settings: DiagnosisSettings
+) -> Named:
     every = [place.cause, *place.rivals]
-    likely, status = probabilities_and_status([w.evidence for w in every], at_floor, settings)
+    evidence = [w.evidence for w in every]
+    likely, status = probabilities_and_status(evidence, at_floor, settings, is_needed=is_needed)
     others = zip(every[1:], likely[1:], strict=True)
     rivals = tuple((w, p) for w, p in others if p >= settings.naming.rival)
     return Named(place.cause, likely[0], status, rivals)
@@ -123,15 +127,18 @@ def probabilities_and_status(
     at_floor: bool,
     settings: DiagnosisSettings = DEFAULT,
     coefficients: Mapping[str, float] = COEFFICIENTS,
+    *,
+    is_needed: bool = True,
 ) -> tuple[list[float], Status | None]:
     """Return the probability of a cause and of each of its rivals, and the status of the cause.
 
     evidence: of the cause, then of its rivals. At most one of them is right: together they have at most 1.
+    is_needed: without the cause more than noise is left.
     """
     likely = [probability(e, k == 0, coefficients, settings) for k, e in enumerate(evidence)]
     likely = [p / max(1.0, sum(likely)) for p in likely]
     rivals = [p for p in likely[1:] if p >= settings.naming.rival]
-    is_named = at_floor or _helps(likely[0] + sum(rivals), evidence[0], settings)
+    is_named = (at_floor and is_needed) or _helps(likely[0] + sum(rivals), evidence[0], settings)
     status = status_of(likely[0], rivals, at_floor, settings.naming) if is_named else None
     sign, errors = evidence[0].signature, Z95 * settings.sizes.model_error
     wanders = at_floor and sign.carried > settings.naming.carried and sign.lasting > errors
