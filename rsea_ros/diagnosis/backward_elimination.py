@@ -64,18 +64,22 @@ class ReducedModels:
     def with_rivals(
         self, model: Candidate, trials: Sequence[Trial] = ()
     ) -> list[tuple[str, str, Candidate]]:
-        """Return a cause, one of its listed look-alikes, and the model with the look-alike.
+        """Return a cause, an effect in its place, and the model with that.
 
-        The other is simpler, or as simple where the choice between them was made without the other causes
-        and the model is near the floor: far from it priors say nothing.
+        That is a listed look-alike, or one that was fitted to all training blocks at some step: beside other
+        causes a mode above the band stands in for a delay. It is simpler, or as simple where the choice
+        between them was made without the other causes and the model is near the floor: far from it priors
+        say nothing.
         trials: of the steps forward. Where one was of the same effects, the fit begins with what it reached.
         """
         as_simple = len(model.causes) > 1 and not self._is_far(model)
+        fitted = {t.name for t in trials if t.is_full and t.reason != "at_bound"}
         pairs = [
             (name, rival)
             for name in model.causes
-            for rival in look_alikes(name, self.effects)
-            if rival.name not in model.problem.acting and is_apart(rival, model.problem)
+            for rival in self.effects
+            if rival.name in fitted | {e.name for e in look_alikes(name, self.effects)}
+            and rival.name not in model.problem.acting and is_apart(rival, model.problem)
             and effect_size(rival.name) < effect_size(name) + as_simple
         ]
         rests = self.without(model) if pairs else {}
