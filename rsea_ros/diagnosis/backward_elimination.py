@@ -24,7 +24,7 @@ from rsea_ros.diagnosis.evaluation import Selection, Trial, trial_of
 from rsea_ros.diagnosis.initial_guess import RecordView, initial_guesses
 from rsea_ros.diagnosis.score import likelier_by
 from rsea_ros.diagnosis.settings import DiagnosisSettings
-from rsea_ros.diagnosis.step_fits import screen
+from rsea_ros.diagnosis.step_fits import ScreenedEffect, screen
 from rsea_ros.effects.catalogue import effect_named, look_alikes
 from rsea_ros.effects.effect import Effect
 from rsea_ros.effects.guess import Guess
@@ -78,7 +78,7 @@ class ReducedModels:
             (name, rival)
             for name in model.causes
             for rival in self.effects
-            if rival.name in fitted | {e.name for e in look_alikes(name, self.effects)}
+            if (rival.name in fitted or is_listed(rival, name))
             and rival.name not in model.problem.acting and is_apart(rival, model.problem)
             and effect_size(rival.name) < effect_size(name) + as_simple
         ]
@@ -117,7 +117,7 @@ class ReducedModels:
             guesses = initial_guesses(rival, RecordView(model.cases[0], rig, rest.outputs[0]))
         guesses += [{**rival.typical, **same}] if old.unit == rival.main.unit else []
         screened = screen(solution, rival, guesses, self.settings.forward)
-        if screened is None:
+        if screened is None or not (is_listed(rival, name) or self._is_close(screened, model)):
             return None
         setup = replace(self._setup(model), is_quick=True, iterations=self.settings.fits.full_iterations)
         quick = fit_candidate(setup, screened.problem, screened.theta)
@@ -134,8 +134,16 @@ class ReducedModels:
         is_quick = self._is_far(model)
         return FitSetup(model.cases, self.settings, self.pools.run, model.validation, is_quick=is_quick)
 
+    def _is_close(self, screened: ScreenedEffect, model: Candidate) -> bool:
+        return screened.cost < self.settings.forward.behind_first * model.solution.cost
+
     def _is_far(self, model: Candidate) -> bool:
         return is_far_from_floor(model, self.settings)
+
+
+def is_listed(effect: Effect, name: str) -> bool:
+    """Return whether an effect lists another as its look-alike, or is listed by it."""
+    return bool(look_alikes(name, [effect]))
 
 
 def without_redundant(selection: Selection, models: ReducedModels) -> Selection:
@@ -158,13 +166,13 @@ def with_replacements(selection: Selection, models: ReducedModels) -> Selection:
         without = models.without(last)[name]
         if other.size < last.size:
             trial = trial_of(last, name, without, "no_better_than_simpler", rival)
-            return with_replacements(_replace(selection, other, trial), models)
+            return with_replacements(without_redundant(_replace(selection, other, trial), models), models)
         if costs_priors_less(other, last, models.settings):
             trial = trial_of(last, name, without, "no_better_than_likelier", rival)
             swapped = _replace(selection, other, trial)
             equal = _order_causes(last, [c for c in last.causes if c != name], name)
             rivals = {**selection.rivals, rival: (equal,)}
-            return with_replacements(replace(swapped, rivals=rivals), models)
+            return with_replacements(without_redundant(replace(swapped, rivals=rivals), models), models)
     return selection
 
 

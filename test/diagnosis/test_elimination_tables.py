@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -238,3 +239,14 @@ def test_a_rival_begins_where_the_latest_of_its_trials_ended(world):
     scripted.models.with_rivals(scripted.fits.candidate(STRIBECK), trials)
     assert set(scripted.guesses[FRICTION][0].values()) == {0.5}
     assert len(scripted.guesses[FRICTION]) == 2, "beside it only the size of the cause"
+
+
+@pytest.mark.parametrize(("is_full", "causes"), [(True, (DELAY,)), (False, (STRIBECK,))])
+def test_what_was_fitted_at_some_step_is_tried_in_the_place_of_a_cause_listed_or_not(world, is_full, causes):
+    """A mode above the band was "confirmed" for an F/T sensor that is read late, which nobody had listed."""
+    scripted = world(script({"": 9.0, GAP: 5.0, STRIBECK: 1.0, DELAY: 1.0}), DELAY)
+    tried = trial_of(scripted.fits.candidate(DELAY), DELAY, scripted.fits.candidate(GAP), "explains_less")
+    models = (scripted.fits.candidate(), scripted.fits.candidate(STRIBECK))
+    trials = (replace(tried, is_full=is_full),)
+    left = eliminate_backwards(Selection(models, trials), scripted.models.effects, POOLS, DEFAULT)
+    assert left.last.causes == causes
