@@ -66,19 +66,21 @@ class ReducedModels:
     ) -> list[tuple[str, str, Candidate]]:
         """Return a cause, an effect in its place, and the model with that.
 
-        That is a listed look-alike, or one that was fitted to all training blocks at some step: beside other
-        causes a mode above the band stands in for a delay. It is simpler, or as simple where the choice
-        between them was made without the other causes and the model is near the floor: far from it priors
-        say nothing.
+        That is a listed look-alike, one that was fitted to all training blocks at some step, or that a step
+        could not try: beside other causes a mode above the band stands in for a delay. It is simpler, or as
+        simple where the choice between them was made without the other causes and the model is near the
+        floor: far from it priors say nothing.
         trials: of the steps forward. Where one was of the same effects, the fit begins with what it reached.
         """
         as_simple = len(model.causes) > 1 and not self._is_far(model)
         fitted = {t.name for t in trials if t.is_full and t.reason != "at_bound"}
+        searched = {t.beside.causes: t.beside.problem for t in trials}.values()
+        barred = {e.name for e in self.effects if not all(is_apart(e, p) for p in searched)}
         pairs = [
             (name, rival)
             for name in model.causes
             for rival in self.effects
-            if (rival.name in fitted or is_listed(rival, name))
+            if (rival.name in fitted | barred or is_listed(rival, name))
             and rival.name not in model.problem.acting and is_apart(rival, model.problem)
             and effect_size(rival.name) < effect_size(name) + as_simple
         ]

@@ -25,9 +25,7 @@ EFFECT = Effect(
     port=Port.SENSOR,
     order=15,
     parameters=(AGE,),
-    claims=Claims(
-        "ft", "odd", amplitude_exponent=1.0, confusable_with=("ft_sensor_lag", "structural_resonance")
-    ),
+    claims=Claims("ft", "odd", amplitude_exponent=1.0, confusable_with=("ft_sensor_lag",)),
     function=apply,
     states=RING,
     response=lambda p, s: np.exp(-p[0] * s),

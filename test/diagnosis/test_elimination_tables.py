@@ -39,7 +39,7 @@ class World:
         if rival.name in self.impossible:
             return None
         made = scripted.problem(*solution.problem.added, rival.name)
-        return SimpleNamespace(problem=made, theta=np.zeros(len(made.unknowns)))
+        return SimpleNamespace(problem=made, theta=np.zeros(len(made.unknowns)), cost=-1.0)
 
     def eliminate(self, *causes):
         """Return the selection that is left of some causes."""
