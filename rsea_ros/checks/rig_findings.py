@@ -68,7 +68,7 @@ def _offset(name: str, offset: Number, linear: LinearisedFit) -> Finding:
         best = min(others, key=lambda n: linear.offset[n].sd)
         apart = offset.value - linear.offset[best].value
         sure = abs(apart) > SURE * (offset.sd**2 + linear.offset[best].sd ** 2) ** 0.5
-        if sure and abs(apart) > _ALLOWED and _is_clear(linear, tuple(linear.misfit)):
+        if sure and abs(apart) > _ALLOWED and linear.fits:
             light, detail = "amber", f"{1e6 * apart:.4g} µs later than {best}, {_RELATIVE}"
     remedy = "stamp both at acquisition by one clock" if light == "amber" else ""
     return Finding(
@@ -82,7 +82,7 @@ def _drift(name: str, drift: Number, linear: LinearisedFit, duration: float) -> 
     if drift.sd * duration > _OPEN:
         return _undetermined_clock("clock_drift", name, drift.sd * duration)
     sure = abs(drift.value) > SURE * drift.sd and abs(drift.value) * duration > _ALLOWED
-    light: Light = "amber" if sure and _is_clear(linear, (name,)) else "green"
+    light: Light = "amber" if sure and linear.fits else "green"
     return drift_finding(light, name, drift, duration, _beside(linear, name).removeprefix("; "))
 
 
@@ -101,10 +101,6 @@ def _undetermined_clock(kind: str, name: str, sd: float) -> Finding:
     """Return that these data do not determine a clock. sd: s, of its offset or of its drift by the end."""
     detail = f"not determined: these data leave {1e3 * sd:.2g} ms, one sigma"
     return Finding("green", kind, name, detail=detail)
-
-
-def _is_clear(linear: LinearisedFit, names: Sequence[str]) -> bool:
-    return all(linear.misfit[n] < BESIDE for n in names)
 
 
 def _beside(linear: LinearisedFit, name: str) -> str:
