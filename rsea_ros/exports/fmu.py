@@ -7,7 +7,7 @@ import tempfile
 from pathlib import Path
 
 from rsea_ros.errors import ParameterError
-from rsea_ros.exports.others import Export, coverage_lines
+from rsea_ros.exports.others import Export, coverage_lines, omitted_sensors
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import rig_text
 from rsea_ros.model.simulation import build
@@ -31,7 +31,7 @@ def export_fmu(rig: Rig) -> Export:
     says |= {one.name: "in the step; its sizes are parameters" for one in rig.effects}
     if rig.linear:
         says["linear rig"] = "m and N stand in the place of rad and N·m"
-    left = {"sensor noise": "outputs are what perfect instruments read"} if rig.sensors else {}
+    left = omitted_sensors(rig, "outputs are what perfect instruments read")
     with tempfile.TemporaryDirectory() as folder:
         files = {"rig.yaml": rig_text(rig), "coverage.txt": "\n".join(coverage_lines(says, left))}
         for name, text in files.items():

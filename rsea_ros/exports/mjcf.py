@@ -256,8 +256,7 @@ def export_mjcf(rig: Rig) -> others.Export:
         except others.Unrepresentable as reason:
             left[name] = str(reason)
     left = others.omitted_effects(rig, says, "MuJoCo has no element for it") | left
-    if rig.sensors:
-        perfect = "sensors of MJCF are those of perfect instruments"
-        left["sensor noise"] = f"{perfect}; the rig's noise and quanta stay with the rig"
+    perfect = "sensors of MJCF are those of perfect instruments; the rig's noise and quanta stay with the rig"
+    left |= others.omitted_sensors(rig, perfect)
     root.insert(0, others.coverage_comment(says, left))
     return others.Export("mjcf", ".xml", text(root), says, left)

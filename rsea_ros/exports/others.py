@@ -107,7 +107,14 @@ def omitted_parts(rig: Rig, why: str) -> dict[str, str]:
     left |= {name: why for name in stiff if math.isfinite(rig[name])}
     load = "its load is the affair of the robot's own links"
     left |= {end: load for end in END_NAMES if rig.end_is_free(end)}
-    return left | ({"sensor noise": "the target's observations have their own"} if rig.sensors else {})
+    return left | omitted_sensors(rig, "the target's observations have their own")
+
+
+def omitted_sensors(rig: Rig, noise: str) -> dict[str, str]:
+    """Return what the rig states of its sensors, which no target reads as they do. noise: why not theirs."""
+    late = {f"sensors.{n}.delay": s.delay for n, s in rig.sensors.items() if s.delay}
+    delays = {name: f"{1e3 * delay:g} ms; read the output so much later" for name, delay in late.items()}
+    return {"sensor noise": noise, **delays} if rig.sensors else {}
 
 
 _LONGEST = 60

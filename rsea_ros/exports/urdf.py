@@ -57,7 +57,7 @@ def _coverage(rig: Rig, chain: Chain, *, has_springs: bool) -> tuple[dict[str, s
     acts = others.finite_sizes(rig).keys() & _EFFECTS
     acts -= set() if any(_acting(joint, rig)[0] for joint in chain.joints) else {"hard_stop"}
     says |= {one.name: _EFFECTS[one.name] for one in rig.effects if one.name in acts}
-    left |= others.omitted_effects(rig, says, only)
+    left |= others.omitted_effects(rig, says, only) | others.omitted_sensors(rig, only)
     if rig.loop is not None:
         left[f"{rig.loop} loop"] = f"a controller's affair; {only}"
     return says, left

@@ -160,3 +160,12 @@ def test_an_effect_at_its_null_value_is_not_exported(target):
     half = rig.with_effects(EffectSetting("voltage_sag", {"limit": 10.0, "no_load_speed": math.inf}))
     made = EXPORTS[target](half)
     assert [name for name, why in made.leaves_out.items() if "inf" in why] == ["voltage_sag"]
+
+
+@pytest.mark.parametrize("target", EXPORTS.keys() - {"feedforward"})  # whose inputs a controller has
+def test_a_sensor_that_is_read_late_is_left_out_by_name(target):
+    rig = load_rig("paper_high_impedance")
+    late = replace(rig, sensors={**rig.sensors, "ft": replace(rig.sensors["ft"], delay=4e-3)})
+    made = EXPORTS[target](late)
+    assert "4 ms" in made.leaves_out["sensors.ft.delay"]
+    assert not any("delay" in name for name in EXPORTS[target](rig).leaves_out)
