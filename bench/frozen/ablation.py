@@ -78,13 +78,13 @@ BRANCHES: Mapping[str, Branch] = {
     "replacement step": Branch({"stepwise:replacement_step": lambda step: importlib.import_module(
         "rsea_ros.diagnosis.stepwise").NO_STEP}),
     "a tenth of the guess": Branch({"step_fits:_other_guesses": _nothing}),
-    "common clock into the delay": Branch({"candidate:with_common_clock_in_delay": lambda solution: None}),
+    "common clock into the delay": Branch({"candidate:with_clocks_in_delays": lambda solution: None}),
     "a time within the clocks is no cause": Branch({
         "candidate:is_within_clocks": _no, "backward_elimination:is_within_clocks": _no}),
     "quick replacement dropped": Branch(
         {"backward_elimination:ReducedModels._with": _fitted_on}, acts=_was_dropped),
     "close rivals fitted to the end": Branch(
-        {"naming.weighing:_with_close_ones_fitted": lambda tried, *_: tried}, late=True),
+        {"naming.weighing:_beside_all_causes": lambda tried, *_: tried}, late=True),
     "a cause that changes nothing": Branch(
         late=True, setting=("evidence", "least_contribution", 0.0),
         noted="naming.evidence:rows_of", acts=lambda rows, *_: rows is None),

@@ -22,6 +22,7 @@ from rsea_ros.diagnosis.criteria import (
 )
 from rsea_ros.diagnosis.evaluation import Selection, Trial, trial_of
 from rsea_ros.diagnosis.initial_guess import RecordView, initial_guesses
+from rsea_ros.diagnosis.result import Reason
 from rsea_ros.diagnosis.score import likelier_by
 from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.diagnosis.step_fits import ScreenedEffect, screen
@@ -160,22 +161,25 @@ def without_redundant(selection: Selection, models: ReducedModels) -> Selection:
 
 
 def with_replacements(selection: Selection, models: ReducedModels) -> Selection:
-    """Replace a cause by one of its listed look-alikes, if that is simpler or likelier."""
-    last = selection.last
+    """Replace a cause by what is simpler or likelier in its place, and keep what is not as contenders."""
+    last, contenders = selection.last, dict[str, tuple[Trial, ...]]()
     for name, rival, other in models.with_rivals(last, selection.trials):
-        if models.is_needed(last, other):
-            continue
-        without = models.without(last)[name]
-        if other.size < last.size:
-            trial = trial_of(last, name, without, "no_better_than_simpler", rival)
-            return with_replacements(without_redundant(_replace(selection, other, trial), models), models)
-        if costs_priors_less(other, last, models.settings):
-            trial = trial_of(last, name, without, "no_better_than_likelier", rival)
-            swapped = _replace(selection, other, trial)
-            equal = _order_causes(last, [c for c in last.causes if c != name], name)
-            rivals = {**selection.rivals, rival: (equal,)}
-            return with_replacements(without_redundant(replace(swapped, rivals=rivals), models), models)
-    return selection
+        without, reason = models.without(last)[name], _prefers(last, other, models)
+        if reason != "explains_less":
+            swapped = _replace(selection, other, trial_of(last, name, without, reason, rival))
+            return with_replacements(without_redundant(swapped, models), models)
+        beaten = trial_of(other, rival, without, reason, name)
+        contenders[name] = (*contenders.get(name, ()), beaten)
+    return replace(selection, contenders=contenders)
+
+
+def _prefers(last: Candidate, other: Candidate, models: ReducedModels) -> Reason:
+    """Return why another model is to be preferred to the last one, or that it explains less."""
+    if models.is_needed(last, other):
+        return "explains_less"
+    if other.size < last.size:
+        return "no_better_than_simpler"
+    return "no_better_than_likelier" if costs_priors_less(other, last, models.settings) else "explains_less"
 
 
 def nested_sequence(selection: Selection, models: ReducedModels) -> Selection:

@@ -112,8 +112,8 @@ def refusal(model: Scored, current: Scored, settings: DiagnosisSettings = DEFAUL
 
 def break_tie(
     models: Sequence[M], current: Score, settings: DiagnosisSettings = DEFAULT
-) -> tuple[M | None, tuple[M, ...]]:
-    """Return the model to accept and those that do as well with no more parameters.
+) -> M | None:
+    """Return the model to accept.
 
     The best is the likeliest, the cost of leaving known values included. The simplest is accepted of all that
     are neither surely and materially worse, nor so far from known values that keeping them pays for the
@@ -121,7 +121,7 @@ def break_tie(
     a drift settles, does not count in `size`).
     """
     if not models:
-        return None, ()
+        return None
     far = settings.floor.far
     least = min(models, key=lambda m: float(m.validation.loss(current).sum()))
     best = max(models, key=lambda m: likelier_by(m, least, far))
@@ -137,8 +137,7 @@ def break_tie(
     def worth(m: M) -> float:
         return likelier_by(m, best, far) - settings.acceptance.price * m.parameters
 
-    chosen = min(contenders, key=lambda m: (m.size, -worth(m)))
-    return chosen, tuple(m for m in contenders if m is not chosen and m.size <= chosen.size)
+    return min(contenders, key=lambda m: (m.size, -worth(m)))
 
 
 def is_nearly_as_good(model: Scored, best: Scored, settings: DiagnosisSettings = DEFAULT) -> bool:

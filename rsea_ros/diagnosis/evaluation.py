@@ -46,12 +46,12 @@ def trial_of(model: Candidate, name: str, beside: Candidate, reason: Reason, riv
 class Selection:
     """The accepted models, from the nominal one on, and other trials.
 
-    rivals: by accepted cause, the models that do as well with another effect in its place.
+    contenders: by accepted cause, what was fitted in its place beside all the other causes.
     """
 
     models: tuple[Candidate, ...]
     trials: tuple[Trial, ...] = ()
-    rivals: Mapping[str, tuple[Candidate, ...]] = field(default_factory=dict)
+    contenders: Mapping[str, tuple[Trial, ...]] = field(default_factory=dict)
 
     @property
     def cases(self) -> tuple[Case, ...]:
@@ -62,10 +62,6 @@ class Selection:
     def last(self) -> Candidate:
         """The model with all accepted causes."""
         return self.models[-1]
-
-    def rivals_of(self, cause: str) -> tuple[Candidate, ...]:
-        """Return the models that do as well with another in a cause's place, which is no cause beside it."""
-        return tuple(m for m in self.rivals.get(cause, ()) if m.newest not in self.last.causes)
 
 
 @dataclass(frozen=True)

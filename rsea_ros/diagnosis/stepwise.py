@@ -47,14 +47,13 @@ from rsea_ros.progress import Progress
 
 
 class StepResult(NamedTuple):
-    """The model to accept, if any, all other trials, and the models that do as well as it."""
+    """The model to accept, if any, and all other trials."""
 
     accepted: Candidate | None
     trials: list[Trial]
-    equals: tuple[Candidate, ...]
 
 
-NO_STEP = StepResult(None, [], ())
+NO_STEP = StepResult(None, [])
 
 
 @dataclass(frozen=True)
@@ -83,13 +82,13 @@ class ForwardStep:
         ):
             models += self.fits.on_measured_angle()
         contenders = self._acceptable(models) or self._pairs(finalists)
-        chosen, equals = self._choose(contenders)
+        chosen = self._choose(contenders)
         if chosen is not None and is_off_rig(chosen.solution):
             contenders += self._pairs_nearer_the_rig(chosen, close)
-            chosen, equals = self._choose(contenders)
+            chosen = self._choose(contenders)
         trials = [self._far_behind(s) for s in _others(screened, finalists)]
         trials += [self._refusal(m, chosen) for m in models if m is not chosen]
-        return StepResult(chosen, trials, equals)
+        return StepResult(chosen, trials)
 
     @cached_property
     def fits(self) -> StepFits:
@@ -99,8 +98,8 @@ class ForwardStep:
     def _acceptable(self, models: Sequence[Candidate]) -> list[Candidate]:
         return [m for m in models if is_acceptable(m, self.current, self.settings)]
 
-    def _choose(self, models: Sequence[Candidate]) -> tuple[Candidate | None, tuple[Candidate, ...]]:
-        """Return the model to accept and those that do as well."""
+    def _choose(self, models: Sequence[Candidate]) -> Candidate | None:
+        """Return the model to accept."""
         return break_tie(models, self.current.validation, self.settings)
 
     def _fit_to_pieces(self, screened: Sequence[ScreenedEffect]) -> list[ScreenedEffect]:
@@ -213,7 +212,6 @@ def select_stepwise(
     setup = FitSetup(nominal.cases, settings, pools.run)
     models = [_fit_nominal(nominal, setup, start)]
     trials: list[Trial] = []
-    rivals: dict[str, tuple[Candidate, ...]] = {}
     for number in range(settings.max_causes + settings.forward.replacements):
         current = models[-1]
         if _is_finished(current):
@@ -225,11 +223,10 @@ def select_stepwise(
             step = replacement_step(forward)
         if step.accepted is None:
             break
-        rivals[step.accepted.newest] = step.equals
         trials.append(trial_of(step.accepted, step.accepted.newest, current, "replaced"))
         models.append(on_fine_steps(refit(with_noise_reestimated(step.accepted), setup), setup))
     cases = models[-1].cases
-    return Selection((*(rescore(m, cases) for m in models[:-1]), models[-1]), tuple(trials), rivals)
+    return Selection((*(rescore(m, cases) for m in models[:-1]), models[-1]), tuple(trials))
 
 
 def replacement_step(step: ForwardStep) -> StepResult:

@@ -148,9 +148,9 @@ def test_a_likelier_effect_as_simple_takes_the_place_beside_another_cause(world,
     assert set(selection.last.causes) == left
     replaced = LAG in left
     assert reasons(selection) == [(DELAY, "no_better_than_likelier", LAG)] * replaced
-    if replaced:
-        (rival,) = selection.rivals[LAG]
-        assert rival.causes == (GAP, DELAY), "what it replaced stands against it, the newest"
+    if not replaced:
+        (rival,) = selection.contenders[DELAY]
+        assert (rival.name, rival.beside.causes) == (LAG, (GAP,)), "what did not replace it stands against it"
 
 
 @pytest.mark.parametrize("both", [5.0, 9.0])

@@ -34,8 +34,8 @@ def test_a_third_model_that_fits_badly_does_not_change_the_choice_between_two():
     """A loss in units of a large residual is small: known values would outweigh it."""
     better, likelier = model(FRICTION, ft=1.0, prior_cost=2000.0), model(GAP, ft=2.0)
     current, poor = model(ft=8.0), model(STOP, ft=4.0)
-    assert break_tie([better, likelier], current.validation) == (better, ())
-    assert break_tie([better, likelier, poor], current.validation) == (better, ())
+    assert break_tie([better, likelier], current.validation) is better
+    assert break_tie([better, likelier, poor], current.validation) is better
 
 
 def test_far_from_the_floor_leaving_known_values_costs_more_than_an_uneven_gain():
@@ -44,8 +44,8 @@ def test_far_from_the_floor_leaving_known_values_costs_more_than_an_uneven_gain(
                          spread=0.6) for size, cost in ((2, 200.0), (1, 3.0)))  # fmt: skip
     plain = model("command_delay", prior_cost=3.0, ft=21.0, spread=-0.2)
     assert likelier_by(plain, bent, DEFAULT.floor.far) > 0.0 > likelier_by(bent, plain, DEFAULT.floor.far)
-    assert break_tie([bent, plain], model(ft=25.0).validation)[0] is plain
-    assert break_tie([cheap, plain], model(ft=25.0).validation)[0] is cheap
+    assert break_tie([bent, plain], model(ft=25.0).validation) is plain
+    assert break_tie([cheap, plain], model(ft=25.0).validation) is cheap
 
 
 @pytest.mark.parametrize(

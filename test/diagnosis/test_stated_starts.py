@@ -73,5 +73,5 @@ def test_of_equal_models_the_simpler_is_chosen_unless_it_leaves_known_values_far
         "one": model(LAG, size=1, ft=1.0, prior_cost=away),
         "two": model(LAG, DELAY, size=2, ft=1.0, prior_cost=0.5),
     }
-    best, _ = break_tie(list(models.values()), model(ft=20.0).validation)
+    best = break_tie(list(models.values()), model(ft=20.0).validation)
     assert best is models[chosen]

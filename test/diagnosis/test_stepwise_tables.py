@@ -40,8 +40,8 @@ class Step:
         accepted = world.steps.get(self.current.causes)
         tried = [trial_of(self.current, "dead_zone", self.current, "not_sure")]
         if accepted is None:
-            return StepResult(None, tried, ())
-        return StepResult(world.fits.candidate(*accepted), tried, (world.fits.candidate(LAG),))
+            return StepResult(None, tried)
+        return StepResult(world.fits.candidate(*accepted), tried)
 
 
 class World:
@@ -137,14 +137,14 @@ def test_no_more_replacements_are_made_than_allowed(world, monkeypatch, replacem
 
     def replace_step(step):
         name = following[step.current.causes]
-        return StepResult(search.fits.candidate(*name), [], (search.fits.candidate(FRICTION),))
+        return StepResult(search.fits.candidate(*name), [])
 
     monkeypatch.setattr(stepwise, "replacement_step", replace_step)
     selection = search.select(settings(max_causes=1, replacements=replacements))
     assert selection.last.causes == last
 
 
-def test_trials_and_equal_models_are_kept(world):
+def test_trials_are_kept(world):
     selection = world(script(BOTH), ALONG).select()
     assert [(t.name, t.beside.causes, t.reason) for t in selection.trials] == [
         ("dead_zone", (), "not_sure"),
@@ -152,10 +152,6 @@ def test_trials_and_equal_models_are_kept(world):
         ("dead_zone", (FRICTION,), "not_sure"),
         (GAP, (FRICTION,), "replaced"),
     ]
-    assert {name: [m.causes for m in equals] for name, equals in selection.rivals.items()} == {
-        FRICTION: [(LAG,)],
-        GAP: [(LAG,)],
-    }
 
 
 def test_every_model_is_fitted_again_in_its_noise_and_all_are_scored_in_that_of_the_last(world):

@@ -66,6 +66,7 @@ def cause_of(
         gain_train=train, gain_holdout=held_out, gain_holdout_ci95=interval,
         times_noise=(without.test.ratio(channel), with_it.test.ratio(channel)), equation=effect.equation,
         channel=channel, status=named.status or "leading", probability=named.probability,
+        confusable_with=tuple(w.claim.name for w, _ in named.rivals) if named.status == "one_of" else (),
     )
 
 
@@ -233,16 +234,11 @@ def outcome_of(
     if verdict == "unexplained":
         channel, stages = main_channel(stages[0].test, channel, levels.reached), stages[:1]
     causes = tuple(
-        with_rivals(cause_of(step, stages[-1], channel, naming[step[1].added], settings), selection)
+        cause_of(step, stages[-1], channel, naming[step[1].added], settings)
         for step in itertools.pairwise(stages)
         if is_named(step[1], naming)
     )
     return Outcome(verdict, causes[0].channel if causes else channel, stages, causes, dropped, naming)
-
-
-def with_rivals(cause: Cause, selection: Selection) -> Cause:
-    """Return a cause with the names of the effects that do as well in its place."""
-    return replace(cause, confusable_with=tuple(m.newest for m in selection.rivals_of(cause.name)))
 
 
 def naming_of(
@@ -432,10 +428,13 @@ def _next_experiment(
 ) -> Experiment | None:
     """Return the run that would decide an open question; None without one. rate: of its commands, Hz."""
     last = outcome.stages[-1]
-    for stage in outcome.stages[1:]:
-        rivals = selection.rivals_of(stage.added)
-        if rivals:
-            return separating_run(stage.solution, [m.solution for m in rivals], rate, settings.next_run)
+    for cause in outcome.causes:
+        if cause.confusable_with:
+            named = outcome.named[cause.name]
+            claims = [named.cause.claim, *(rival.claim for rival, _ in named.rivals)]
+            problems = [replace(c.problem, newest=c.name) for c in claims]
+            ends = [solve(p, c.theta, iterations=0) for p, c in zip(problems, claims, strict=True)]
+            return separating_run(ends[0], ends[1:], rate, settings.next_run)
     if outcome.verdict in ("unexplained", "partly_explained") and not is_at_floor(last.test, settings.floor):
         return amplitude_series(last.solution, last.test.ratio(last.test.worst), rate, settings.next_run)
     return None

@@ -52,99 +52,75 @@ def contests(
     selection: Selection, stages: Sequence[Evaluated], held_out: HeldOut, pools: Pools
 ) -> list[Contest]:
     """Return the contest for the place of each accepted cause, in the order of the stages."""
-    result = []
-    for without, with_it in itertools.pairwise(stages):
-        name = with_it.added
-        last = stages[-1].solution
-        claim = Claim(name, last.problem, last.theta, with_it.test, without.test, 1.0)
-        rounds = [t for t in selection.trials if t.name == name and t.reason == "replaced"]
-        tried = beside(selection, rounds[-1].beside) if rounds else []
-        result.append(weigh_rivals(selection, claim, tried, held_out, pools))
-    return result
+    last = stages[-1].solution
+    claims = [
+        Claim(with_it.added, last.problem, last.theta, with_it.test, without.test, 1.0)
+        for without, with_it in itertools.pairwise(stages)
+    ]
+    return [weigh_rivals(selection, claim, held_out, pools) for claim in claims]
 
 
-def beside(selection: Selection, model: Candidate) -> list[Trial]:
-    """Return the trials beside a model that were fitted to all training blocks, the last of each effect.
-
-    Not those whose size ended at a bound.
-    """
-    full = {t.name: t for t in selection.trials if t.is_full and t.beside.causes == model.causes}
-    return [t for t in full.values() if t.reason != "at_bound"]
-
-
-def _in_the_open(tried: Sequence[Trial], kept: str, near: float) -> list[Trial]:
-    """Return trials without those, one kept apart, that ended at a bound: such a law imitates another."""
-    return [t for t in tried if t.name == kept or not is_at_edge(t.problem, t.theta, t.name, near)]
-
-
-def weigh_rivals(
-    selection: Selection, claim: Claim, tried: Sequence[Trial], held_out: HeldOut, pools: Pools
-) -> Contest:
-    """Return a contest of a claim with the effects tried beside the same model, or as good in its place.
+def weigh_rivals(selection: Selection, claim: Claim, held_out: HeldOut, pools: Pools) -> Contest:
+    """Return a cause and its rivals, weighed beside all the other causes.
 
     Another cause that was accepted too is no rival, whichever of the two came first. Where the accepted model
     itself is far from the rig, the rig is doubtful: its values decide between no two causes.
     """
-    accepted, settings = selection.last.causes, selection.last.settings
-    rule = settings.evidence
-    near = settings.acceptance.near_bound
-    tried = [t for t in tried if t.name == claim.name or t.name not in accepted]
-    tried = _in_the_open(tried, claim.name, near)
+    settings = selection.last.settings
+    rule, near = settings.evidence, settings.acceptance.near_bound
     trust = 0.0 if is_off_rig(selection.last.solution) else 1.0
-    scores, weights = _race(tried, held_out, pools, settings, trust)
-    if sum(w >= rule.close_weight for w in weights) > 1:
-        tried = _beside_all_causes(tried, weights, claim, selection, pools)
-        tried = _in_the_open(tried, claim.name, near)
-        scores, weights = _race(tried, held_out, pools, settings, trust)
-    weight_of = {t.name: w for t, w in zip(tried, weights, strict=True)}
-    rivals = [
-        Claim(t.name, t.problem, t.theta, s, held_out.score_of(t.beside), weight_of[t.name])
-        for t, s in zip(tried, scores, strict=True)
-        if t.name != claim.name
+
+    def race(tried: Sequence[Trial]) -> tuple[list[Trial], list[Score], list[float]]:
+        """Return trials whose size ended at no bound, where a law imitates another; scores and weights."""
+        runs = [t for t in tried if t.name == claim.name or not is_at_edge(t.problem, t.theta, t.name, near)]
+        scores = list(pools.fits.map(lambda t: held_out.score(t.problem, t.theta), runs))
+        priors = [trust * prior_cost(t.problem, t.theta) for t in runs]
+        return runs, scores, _stack(scores, priors, [effect_size(t.name) for t in runs], settings)
+
+    mine = Trial(claim.name, selection.last, claim.problem, claim.theta, True, "replaced")
+    close = dict[str, Trial]()
+    for tried in (_of_its_step(selection, claim), [mine, *selection.contenders.get(claim.name, ())]):
+        runs, _, weights = race(tried)
+        close |= {t.name: t for t, w in zip(runs, weights, strict=True) if w >= rule.close_weight}
+    close = {name: t for name, t in close.items() if name not in selection.last.causes}
+    runs, scores, weights = race([mine, *_beside_all_causes(list(close.values()), claim, selection, pools)])
+    claims = [
+        Claim(t.name, t.problem, t.theta, score, held_out.score_of(t.beside), weight)
+        for t, score, weight in zip(runs[1:], scores[1:], weights[1:], strict=True)
+        if weight >= rule.least_weight
     ]
-    swapped = [m for m in selection.rivals_of(claim.name) if len(m.causes) == len(accepted)]
-    models = [selection.last, *swapped]
-    tested = [held_out.score_of(m) for m in models]
-    priors, lengths = [trust * m.prior_cost for m in models], [m.size for m in models]
-    among_swapped = _stack(tested, priors, lengths, settings)
-    among_tried = weight_of.get(claim.name, 1.0)
-    for model, with_it, weight in zip(swapped, tested[1:], among_swapped[1:], strict=True):
-        theta = model.solution.theta
-        rivals.append(Claim(model.newest, model.problem, theta, with_it, claim.without, weight))
-    heavy = sorted((r for r in rivals if r.weight >= rule.least_weight), key=lambda r: -r.weight)
-    once = {r.name: r for r in reversed(heavy)}
-    kept = sorted(once.values(), key=lambda r: -r.weight)[: rule.most_rivals]
-    return Contest(replace(claim, weight=min(among_tried, among_swapped[0])), tuple(kept))
+    heaviest = sorted(claims, key=lambda c: -c.weight)[: rule.most_rivals]
+    return Contest(replace(claim, weight=weights[0]), tuple(heaviest))
 
 
-def _race(
-    tried: Sequence[Trial], held_out: HeldOut, pools: Pools, settings: DiagnosisSettings, trust: float
-) -> tuple[list[Score], list[float]]:
-    """Return the scores of trials and their weights. trust: share of the priors' cost that counts."""
-    scores = list(pools.fits.map(lambda t: held_out.score(t.problem, t.theta), tried))
-    priors = [trust * prior_cost(t.problem, t.theta) for t in tried]
-    return scores, _stack(scores, priors, [effect_size(t.name) for t in tried], settings)
+def _of_its_step(selection: Selection, claim: Claim) -> list[Trial]:
+    """Return the trials beside the model to which a cause was added, fitted to all training blocks.
+
+    The last of each effect, and none whose size ended at a bound.
+    """
+    steps = [t.beside for t in selection.trials if t.name == claim.name and t.reason == "replaced"]
+    full = {
+        t.name: t for t in selection.trials
+        if steps and t.is_full and t.beside.causes == steps[-1].causes
+    }  # fmt: skip
+    return [t for t in full.values() if t.reason != "at_bound"]
 
 
 def _beside_all_causes(
-    tried: Sequence[Trial], weights: Sequence[float], claim: Claim, selection: Selection, pools: Pools
+    tried: Sequence[Trial], claim: Claim, selection: Selection, pools: Pools
 ) -> list[Trial]:
-    """Return a cause and the trials of some weight, each fitted to the end beside all the other causes.
+    """Return trials fitted to the end in the place of a cause, beside all the other causes.
 
     What came later still hid in the residual when these were tried. No larger law that may be a smaller one.
     """
-    least = selection.last.settings.evidence.close_weight
     rest, _ = without_effect(claim.problem, claim.theta, claim.name)
-    mine = [replace(t, problem=claim.problem, theta=claim.theta) for t in tried if t.name == claim.name]
-    close = [
-        t for t, w in zip(tried, weights, strict=True)
-        if w >= least and t.name != claim.name and is_apart(effect_named(t.name), rest)
-    ]  # fmt: skip
-    models = list(pools.fits.map(lambda t: _in_place_of(claim, t, selection, pools).solution, close))
-    ends = [replace(t, problem=m.problem, theta=m.theta) for t, m in zip(close, models, strict=True)]
-    is_more = [effect_size(t.name) > effect_size(claim.name) for t in close]
-    nested = [more and may_be_less(m, m.problem.newest) for more, m in zip(is_more, models, strict=True)]
-    return [*mine, *(t for t, is_nested in zip(ends, nested, strict=True) if not is_nested)]
+    apart = [t for t in tried if is_apart(effect_named(t.name), rest)]
+    ends = pools.fits.map(lambda t: _in_place_of(claim, t, selection, pools).solution, apart)
+    return [
+        replace(t, problem=end.problem, theta=end.theta)
+        for t, end in zip(apart, ends, strict=True)
+        if effect_size(t.name) <= effect_size(claim.name) or not may_be_less(end, t.name)
+    ]
 
 
 def may_be_less(solution: Solution, name: str) -> bool:
