@@ -189,7 +189,7 @@ def drift_findings(record: Record, lines: Mapping[str, LagLine], pairs: Sequence
     is_joint = abs(off) + abs(joint + line.rate) < _PLAINLY * (abs(off - line.rate) + abs(joint))
     names = [n for n in lines if n == x or {n, x} <= set(JOINT)] if is_joint else ["ft"]
     rate = -line.rate if is_joint else line.rate
-    return [_drift_of("amber", n, line, rate, _bend(line), f"seen between ft and {x}") for n in names]
+    return [_drift_of("amber", n, line, rate, line.bend, f"seen between ft and {x}") for n in names]
 
 
 def _behind(record: Record, pair: Pair, name: str) -> Iterator[LagLine]:
@@ -201,12 +201,7 @@ def _behind(record: Record, pair: Pair, name: str) -> Iterator[LagLine]:
 
 
 def _is_straight(line: LagLine) -> bool:
-    return _rises(line) and abs(line.rate) > SURE * _bend(line)
-
-
-def _bend(line: LagLine) -> float:
-    """Return the rate (s/s) that a line of its scatter would have if all of that were a bend."""
-    return line.scatter * math.sqrt(12.0) / abs(line.rise / line.rate)
+    return _rises(line) and abs(line.rate) > SURE * line.bend
 
 
 def _drift_of(light: Light, name: str, line: LagLine, rate: float, doubt: float, beside: str) -> Finding:

@@ -55,12 +55,21 @@ SCATTER = 0.25
 """Of the rise of a line: lags that scatter more about it do not follow a clock."""
 
 
+_MEDIAN = 0.6745
+"""Of a normal's standard deviation: the median of its size."""
+
+
 class LagLine(NamedTuple):
-    """A line through lags: rate (s/s), scatter of the lags about it (s), and its rise over the record (s)."""
+    """A line through lags: rate (s/s), scatter of the lags about it (s), and its rise over the record (s).
+
+    scatter: by what the blocks show. bend: the rate that the line would have if what half of the blocks are
+    off it, each alike, were one bend (s/s).
+    """
 
     rate: float
     scatter: float
     rise: float
+    bend: float
 
     @property
     def is_clear(self) -> bool:
@@ -78,8 +87,10 @@ def lag_line(t: FloatArray, y: FloatArray, p: FloatArray, start: float) -> LagLi
     if len(lag) < _FEWEST:
         return None
     rate, at_start = np.polyfit(since, lag, 1, w=np.sqrt(weight))
-    scatter = math.sqrt(float(np.average((lag - at_start - rate * since) ** 2, weights=weight)))
-    return LagLine(float(rate), scatter, float(rate) * float(np.ptp(t)))
+    off, duration = lag - at_start - rate * since, float(np.ptp(t))
+    scatter = math.sqrt(float(np.average(off**2, weights=weight)))
+    bend = math.sqrt(12.0) * float(np.median(np.abs(off))) / _MEDIAN / duration
+    return LagLine(float(rate), scatter, float(rate) * duration, bend)
 
 
 def _lags(
