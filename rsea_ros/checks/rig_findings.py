@@ -166,6 +166,8 @@ def _rises(line: LagLine) -> bool:
     return abs(line.rise) > LEAST_RISE and abs(line.rate) < _STEEPEST
 
 
+_STRAIGHT = 5.0
+"""Times its bend: what a cause in spring or sensor makes of the lag is at most 4.5 (decision 323)."""
 _PLAINLY = 0.25
 """Of what the lines behind the rig are off if the drift is ft's: if it is the joint's, for it to be that."""
 
@@ -201,7 +203,7 @@ def _behind(record: Record, pair: Pair, name: str) -> Iterator[LagLine]:
 
 
 def _is_straight(line: LagLine) -> bool:
-    return _rises(line) and abs(line.rate) > SURE * line.bend
+    return _rises(line) and abs(line.rate) > _STRAIGHT * line.bend
 
 
 def _drift_of(light: Light, name: str, line: LagLine, rate: float, doubt: float, beside: str) -> Finding:
