@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import argparse
 import importlib
+import sys
 from collections.abc import Callable, Iterator
+from contextlib import redirect_stdout
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +19,6 @@ import rsea_ros as rsea
 from rsea_ros.cli.main import verbs
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.model.rig_file import rig_names, rig_text
-from rsea_ros.nodes._parameters import usage
 from rsea_ros.nodes._policies import NODES
 from rsea_ros.report.fleet.page import write_fleet_report
 
@@ -247,8 +249,11 @@ def helps(folder: Path) -> Iterator[str]:
 def nodes(folder: Path) -> Iterator[str]:
     """Yield what every node prints with --help: its parameters with their ranges and defaults."""
     for name in NODES:
-        module = importlib.import_module(f"rsea_ros.nodes.{name}")
-        yield usage(name, module.TABLE)
+        node = importlib.import_module(f"rsea_ros.nodes.{name}")
+        sys.argv = [name, "--help"]
+        with redirect_stdout(StringIO()) as out:
+            assert node.main() == 0
+        yield out.getvalue()
 
 
 def _options(parser: argparse.ArgumentParser, indent: str) -> Iterator[str]:
