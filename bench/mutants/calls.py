@@ -141,9 +141,10 @@ def _distance(target: str, unit: str) -> tuple[bool, bool, float]:
 def _within_limit(units: Sequence[str]) -> list[str]:
     chosen, spent = [], 0.0
     for unit in units:
-        spent += calls().seconds.get(unit, 1.0)
-        if not chosen or spent < LIMIT:
+        needs = calls().seconds.get(unit, 1.0)
+        if not chosen or spent + needs < LIMIT:
             chosen.append(unit)
+            spent += needs
     return chosen
 
 

@@ -250,7 +250,8 @@ def _rests(y: FloatArray, at: BoolArray) -> bool:
     moving = step[step > 0.0]
     if not len(moving) or not all(map(len, edges)):
         return False
-    usual = float(np.median(moving[moving > 1.5 * moving.min()])) if np.ptp(moving) > 0.0 else 0.0
+    clear = moving[moving > 1.5 * moving.min()]
+    usual = float(np.median(clear)) if len(clear) else 0.0
     slow = max(1.5 * float(moving.min()), _SLOWLY * usual)
     return bool(min(map(np.median, edges)) <= slow < usual)
 

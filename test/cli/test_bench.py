@@ -13,6 +13,7 @@ import yaml
 
 from bench.__main__ import _parser, _print, index, main as run_bench
 from bench.frozen.cases import generated
+from bench.mutants import calls as callers
 from bench.results import read_lines, resumed, write_pages
 from rsea_ros.cli.launch import node_calls
 from rsea_ros.errors import DeviceError
@@ -150,3 +151,13 @@ def test_generators_of_another_hand_are_played_from_their_folder(tmp_path):
     played = entries[0].make()
     assert played.truth == ("coulomb_friction",) and len(played.record["ft"]) == 200
     assert played.rig.name == load_rig("paper_high_impedance").name
+
+
+def test_a_long_test_leaves_room_for_the_shorter_ones_behind_it(monkeypatch):
+    near, long, short = "test/laws/test_source.py", "test/cli/test_long.py", "test/cli/test_short.py"
+    seconds, width = {near: 60.0, long: 31.0, short: 29.0}, {near: 1, long: 1, short: 2}
+    known = callers.Calls({("laws/source", "f"): {near, long, short}}, seconds, width)
+    monkeypatch.setattr(callers, "calls", lambda: known)
+    assert callers.tests_of("laws/source", "f") == ([near, short], [])
+    seconds[long] = 29.0
+    assert callers.tests_of("laws/source", "f") == ([near, long], [])

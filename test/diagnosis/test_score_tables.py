@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -16,12 +17,15 @@ from rsea_ros.diagnosis.score import (
     bootstrap_means,
     gain_of,
     likelier_by,
+    lost_above,
+    missed_response,
     score_on,
     temper,
     tempered_loss,
 )
 from rsea_ros.diagnosis.settings import BlockSettings
 from rsea_ros.identification.problem import Case
+from rsea_ros.model.drive import Drive
 
 SECONDS = BlockSettings(longest=1.0, shortest=1.0)
 NOISE = 2.0
@@ -211,3 +215,45 @@ def test_data_are_tempered_only_where_both_models_are_far_from_the_floor(ratios,
 )
 def test_the_odds_are_those_of_the_data_and_of_the_known_values(ratio, prior_cost, by):
     assert likelier_by(model(ft=ratio, prior_cost=prior_cost), model(ft=2.0, prior_cost=1.0), 5.0) == by
+
+
+def driven(count, error, *, rate=100.0, bad=()):
+    """Return a record of white commands whose ft answers as the output does, but for an error of both."""
+    dice = np.random.default_rng(4)
+    command, own = dice.standard_normal(count), dice.standard_normal(count)
+    t = (np.arange(count) + 0.5) / rate
+    drive = Drive(1.0 / rate, 0.0, command, {}, np.zeros(0), np.zeros(0), (0.0, 0.0))
+    output = 3.0 * command
+    keep = ~np.isin(np.arange(count), bad)
+    case = Case(drive, {"ft": t}, {"ft": output + error(output, own)}, {"ft": 1.0}, {"ft": keep})
+    return case, output, np.arange(count) // 100
+
+
+@pytest.mark.parametrize(
+    ("share", "noise", "blocks", "bad", "missed"),
+    [
+        (0.2, 0.0, 16, (), 1.0), (-0.2, 0.0, 16, (), 1.0), (0.09, 0.0, 16, (), 0.0), (0.11, 0.0, 16, (), 1.0),
+        (0.2, 0.0, 15, (), 0.0), (0.2, 0.0, 17, (150,), 1.0), (0.2, 0.0, 16, (150,), 0.0),
+        (0.0, 1.0, 40, (), 0.0), (0.5, 1.0, 40, (), 1.5**2 / (1.0 + 1.5**2)),
+    ],
+)  # fmt: skip
+def test_a_response_is_missed_from_a_tenth_of_it_on(share, noise, blocks, bad, missed):
+    """Coherence^2 of what is left with the command; 16 sound blocks are needed."""
+    made, output, of = driven(100 * blocks, lambda y, own: share * y + noise * own, bad=bad)
+    found = missed_response(made, output, "ft", of, BlockSettings())
+    assert found == pytest.approx(missed, abs=0.2 if noise and missed else 1e-6)
+
+
+@pytest.mark.parametrize(("edge", "rate"), [(20.0, 100.0), (10.0, 100.0), (55.0, 280.0)])
+def test_a_channel_is_lost_above_the_frequency_from_which_it_is_noise(edge, rate):
+    def error(output, own):
+        hz = np.fft.rfftfreq(len(output), 1.0 / rate)
+        lost = np.fft.rfft(9.0 * own - output) * (hz > edge)
+        return np.fft.irfft(lost, len(output))
+
+    made, *_ = driven(20_000, error, rate=rate)
+    assert lost_above(made, "ft") == pytest.approx(edge, abs=0.02 * rate)
+    for sound in (lambda y, own: 0.0 * y, lambda y, own: 99.0 * own):
+        assert lost_above(driven(20_000, sound, rate=rate)[0], "ft") is None
+    assert lost_above(driven(100, error, rate=rate)[0], "ft") is None, "too short"
+    assert lost_above(replace(made, drive=SimpleNamespace()), "ft") is None

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import argparse
 import importlib
+import sys
 from collections.abc import Callable, Iterator
+from contextlib import redirect_stdout
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +19,7 @@ import rsea_ros as rsea
 from rsea_ros.cli.main import verbs
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.model.rig_file import rig_names, rig_text
+from rsea_ros.nodes._policies import NODES
 from rsea_ros.report.fleet.page import write_fleet_report
 
 RIG = "paper_high_impedance"
@@ -242,6 +246,16 @@ def helps(folder: Path) -> Iterator[str]:
         seen |= set(_options(parser, "  "))
 
 
+def nodes(folder: Path) -> Iterator[str]:
+    """Yield what every node prints with --help: its parameters with their ranges and defaults."""
+    for name in NODES:
+        node = importlib.import_module(f"rsea_ros.nodes.{name}")
+        sys.argv = [name, "--help"]
+        with redirect_stdout(StringIO()) as out:
+            assert node.main() == 0
+        yield out.getvalue()
+
+
 def _options(parser: argparse.ArgumentParser, indent: str) -> Iterator[str]:
     for action in parser._actions:
         if isinstance(action, argparse._SubParsersAction):
@@ -260,6 +274,6 @@ def _options(parser: argparse.ArgumentParser, indent: str) -> Iterator[str]:
 
 SCRIPTS: dict[str, Callable[[Path], Iterator[str]]] = {
     "effects_in_motion": effects_in_motion, "observed": observed, "worn_fleet": worn_fleet,
-    "few_days": few_days, "helps": helps,
+    "few_days": few_days, "helps": helps, "nodes": nodes,
 }  # fmt: skip
 """What no line of the command line shows."""

@@ -14,8 +14,10 @@ import re
 import zipfile
 from collections.abc import Iterable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from plotly.graph_objects import Figure
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
@@ -124,6 +126,18 @@ def _unpacked(first: float, slope: float, step: float, data: str) -> Iterable[fl
     return np.where(whole == 2.0**16 - 1.0, np.nan, first + slope * np.arange(len(whole)) + step * whole)
 
 
+def _drawn(value: Any) -> Any:
+    """Return a part of a figure with its packed traces as page.js unpacks them."""
+    match value:
+        case {"first": first, "slope": slope, "step": step, "data": str(data)}:
+            return _unpacked(first, slope, step, data)
+        case dict():
+            return {key: _drawn(each) for key, each in value.items()}
+        case list():
+            return [_drawn(each) for each in value]
+    return value
+
+
 def _numbers(values: list[object]) -> bool:
     return len(values) > LONG and all(v is None or isinstance(v, (int, float)) for v in values)
 
@@ -180,9 +194,13 @@ def page(html: str) -> str:
 
 
 def _figure(attributes: str, content: str, seen: set[str]) -> str:
-    """Return a figure without the lines of its style that an earlier figure of the page has too."""
+    """Return a figure without the lines of its style that an earlier figure of the page has too.
+
+    Raises ValueError for a key, a colour or a mark that plotly does not know, which a browser passes over.
+    """
     if "application/json" not in attributes:
         return ""
+    Figure(**{key: _drawn(json.loads(content)[key]) for key in ("data", "layout")})
     lines = as_json(content).splitlines()
     new = [line for line in lines if line not in seen and not STYLE.match(line)]
     seen |= {line for line in lines if line.startswith((".layout", ".data")) and "×" not in line}

@@ -1,14 +1,16 @@
 """Dynamixel X and P beside Pro: their tables against the maker's numbers, and all of them on the wire."""
 
 import math
-from contextlib import closing
+from contextlib import closing, suppress
 from statistics import fmean
 
 import pytest
 
 from rsea_ros.errors import RseaError
+from rsea_ros.hardware.device import State
 from rsea_ros.hardware.dynamixel.control_tables import TABLES
 from rsea_ros.hardware.limits import Limits
+from rsea_ros.hardware.peer.peer_motor import ACCESS, LIMIT, RANGE, EmulatedMotor
 from rsea_ros.hardware.peer.registers import MODELS
 from test.hardware.conftest import Loop, device_on, well_behaved
 
@@ -81,11 +83,69 @@ def test_the_bench_has_every_model_with_the_same_units():
         table = TABLES[number]
         assert table.ampere == pytest.approx(model.ampere) and table.pulses == model.counts_per_turn
         assert table.radian_per_second == pytest.approx(model.radian_per_second)
+        if known := table.torque_constant:
+            assert model.constant == pytest.approx(known.value, rel=1e-3), number
         for name, register in model.registers.items():
             item = table.optional(names.get(name, name))
             if item is not None:
                 address = (register.address, register.size, register.signed)
                 assert (item.address, item.size, item.signed) == address, f"{number} {name}"
+
+
+X = {
+    "id": (0, 252, 1), "baud": (0, 7, 1), "return_delay": (0, 254, 250), "drive_mode": (0, 13, 0),
+    "mode": (0, 16, 3), "homing_offset": (-1044479, 1044479, 0), "temperature_limit": (0, 100, 80),
+    "startup": (0, 3, 0), "shutdown": (0, 63, 52), "torque_enable": (0, 1, 0), "status_level": (0, 2, 2),
+    "watchdog": (0, 127, 0), "goal_pwm": (-885, 885, 0),
+}  # fmt: skip
+PERMITTED = {
+    1020: X | {"max_voltage": (95, 160, 160), "min_voltage": (95, 160, 95), "torque_limit": (0, 1193, 1193)},
+    1040: X | {"max_voltage": (110, 300, 300), "min_voltage": (110, 300, 110), "torque_limit": (0, 689, 689)},
+    2020: X | {"baud": (0, 9, 3), "homing_offset": (-(2**31), 2**31 - 1, 0), "shutdown": (0, 63, 58),
+               "max_voltage": (150, 350, 350), "min_voltage": (150, 350, 150), "goal_pwm": (-2009, 2009, 0),
+               "torque_limit": (0, 22740, 22740)},
+    54024: {"id": (0, 252, 1), "baud": (0, 8, 3), "return_delay": (0, 254, 250), "mode": (0, 4, 3),
+            "homing_offset": (-(2**31), 2**31 - 1, 0), "temperature_limit": (0, 100, 80),
+            "max_voltage": (0, 400, 400), "min_voltage": (0, 400, 150), "torque_limit": (0, 1860, 620),
+            "shutdown": (0, 63, 58), "torque_enable": (0, 1, 0), "status_level": (0, 2, 2)},
+}  # fmt: skip
+"""Least, largest and first value of the items that may be written, as the e-manual prints them."""
+IN_RAM = {"torque_enable", "status_level", "watchdog", "goal", "goal_pwm", "goal_velocity", "goal_position"}
+MEASURED = {"position", "velocity", "current", "voltage", "temperature", "hardware_error", "tick"}
+
+
+class Nothing:
+    def read(self):
+        return State(0, 0.0, 0.0, 0.0, 0, None)
+
+    def write(self, torque):
+        pass
+
+
+@pytest.mark.parametrize("number", PERMITTED)
+def test_the_bench_takes_what_the_manual_permits_and_nothing_beside(number):
+    motor, rows = EmulatedMotor(number, Nothing()), PERMITTED[number]
+
+    def write(name, value):
+        item = registers[name]
+        return motor.write(0, item.address, value.to_bytes(item.size, "little", signed=item.signed))
+
+    registers, most = motor.model.registers, rows["torque_limit"][1]
+    assert set(registers) <= {*rows, *MEASURED, *IN_RAM}
+    assert motor.get("voltage") in (120, 240) and motor.get("temperature") == 32
+    assert [motor.get(name) for name in rows] == [start for *_, start in rows.values()]
+    goals = {"goal_velocity": (-(2**31), 2**31 - 1, 0), "goal_position": (-(2**31), 2**31 - 1, 0)}
+    motor.put("torque_limit", most)
+    for name, (low, high, start) in {**rows, **goals, "goal": (-most, most, 0)}.items():
+        for value, told in ((low, 0), (high, 0), (low - 1, RANGE), (high + 1, RANGE)):
+            with suppress(OverflowError):  # what its bytes cannot say
+                assert write(name, value) == told, (name, value)
+        motor.put(name, start if name != "torque_limit" else most)
+    motor.put("torque_limit", 600)
+    assert [write("goal", value) for value in (600, -600, 601, -601)] == [0, 0, LIMIT, LIMIT]
+    motor.put("torque_enable", 1)
+    for name in registers:
+        assert write(name, motor.get(name)) == (0 if name in IN_RAM else ACCESS), name
 
 
 SMALL = Limits(2.0, deflection=math.inf, voltage=9.0, current=10.0)

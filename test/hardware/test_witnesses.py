@@ -10,8 +10,10 @@ import pytest
 
 from rsea_ros.control.controller import Measurement, TorqueController
 from rsea_ros.control.law import Gains
+from rsea_ros.hardware.device import Spring, State
 from rsea_ros.hardware.guarded import GuardedDevice
 from rsea_ros.hardware.simulated import SECOND, SimulatedDevice
+from rsea_ros.hardware.witnesses import Actuator, Witnesses
 from rsea_ros.model.rig_file import load_rig, save_rig
 from rsea_ros.model.simulation import Plant
 from rsea_ros.nodes import _control, driver
@@ -196,3 +198,76 @@ def test_a_slow_rate_does_not_let_the_low_pass_run_away():
         now[0] += round(SECOND / 12.0)
         guarded.cycle(8.0, 0.0)
         assert guarded.contradiction == "" and (guarded.fault is None or guarded.fault.cause != "ft")
+
+
+ACTUATOR = Actuator(
+    damping=0.0, inertia=0.5, drag=2.0, by_angle=False, bent=0.2, driven=0.3, risen=0.3, dragged=0.5,
+    play=0.25, friction=1.0, creep=2e-3, late=0.01,
+)  # fmt: skip
+
+
+def hold(ft, *, motor=10.0, bend=math.nan, seconds=6.0, sign=1.0, speed=0.0, **more):
+    """Read a rest, where a deflection is measured, and constant torques at 100 Hz.
+
+    Return the witnesses, when they told something, s, and their fault.
+    """
+    made, told, fault, begin = Witnesses(Spring(100.0, 5, sign), ACTUATOR, 0.01), math.nan, None, 0
+    if not math.isnan(bend):
+        begin = 80
+    for k in range(begin + round(seconds * 100)):
+        on = float(k >= begin)
+        state = State(
+            1 + k * SECOND // 100, 1e-6 * k, speed, on * motor + 1e-9 * (k % 2),
+            wrench=(0.0, 0.0, 0.0, 0.0, 0.0, on * sign * ft), deflection=on * bend / 100.0, **more,
+        )  # fmt: skip
+        fault = fault or made.take(state, 10.0 * on)
+        if math.isnan(told) and (made.words or fault):
+            told = (k - begin) / 100.0
+    return made, told, fault
+
+
+@pytest.mark.parametrize(
+    ("limit", "given"),
+    [
+        (10.0 + 0.25 + 3.0 + 1.0, {}), (10.0 - 4.25, {}), (-10.0 - 4.25, {"motor": -10.0}),
+        (10.0 + 4.25, {"sign": -1.0}), (1.0 + 0.25 + 0.3 + 1.0, {"motor": 1.0}),
+        (10.0 - 0.02 + 0.25 + 0.3 * 9.98 + 0.5 * 0.02 + 1.0, {"speed": 0.01}),
+        (10.0 + 0.02 + 0.25 + 0.3 * 10.02 + 0.5 * 0.02 + 1.0, {"speed": -0.01}),
+    ],
+)  # fmt: skip
+def test_ft_may_differ_from_the_motor_by_play_gain_motion_and_friction(limit, given):
+    """A window of 0.5 s, and as long a contradiction."""
+    far = math.copysign(0.01, limit - given.get("motor", 10.0))
+    assert math.isnan(hold(limit - far, seconds=2.0, **given)[1])
+    made, told, fault = hold(limit + far, seconds=2.0, **given)
+    assert told == pytest.approx(1.0, abs=0.03) and fault is None
+    motor = given.get("motor", 10.0) - 2.0 * given.get("speed", 0.0)
+    said = f"ft {limit + far:.3g}, motor torque less momentum {motor:.3g} N·m contradict"
+    assert made.words == f"{said} each other, expected them alike"
+
+
+@pytest.mark.parametrize(
+    ("limit", "given"),
+    [(10.0 + 0.25 + 0.2 * 10.0, {"bend": 10.0}), (8.0 - 0.25 - 0.2 * 8.0, {"bend": 8.0, "motor": 8.1})],
+)
+def test_ft_may_differ_from_the_spring_by_play_and_stiffness(limit, given):
+    far = math.copysign(0.05, limit - given["bend"])
+    assert math.isnan(hold(limit - far, **given)[1])
+    made, told, fault = hold(limit + far, **given)
+    assert told > 1.0 and fault is None
+    assert f"K times deflection {given['bend']:.3g} N·m contradict" in made.words
+    assert math.isnan(hold(limit + far, **{**given, "motor": limit + far})[1]), "the spring is another one"
+    assert math.isnan(hold(limit + far, **given, inferred=True)[1]), "ft is itself of the deflection"
+
+
+@pytest.mark.parametrize(
+    ("limit", "torque"), [(30.0, 20.0), (20.0 / 1.5, 20.0), (-0.625, 0.0), (0.625, 0.0), (-30.0, -20.0)]
+)
+def test_what_spring_and_motor_together_contradict_gravely_is_a_fault(limit, torque):
+    """By 2.5 times the doubt of the smaller torque, 20 %, or of the play, 0.25 N·m."""
+    given, far = {"bend": torque, "motor": torque, "seconds": 0.4}, math.copysign(0.05, limit - torque)
+    assert hold(limit - far, **given)[2] is None
+    _, told, fault = hold(limit + far, **given)
+    assert (fault.cause, fault.unit) == ("ft", "N m") and fault.value > fault.limit and told <= 0.4
+    given["motor"] += 0.6 * (limit - torque)
+    assert hold(limit + far, **given)[2] is None, "the motor is between both"

@@ -1,6 +1,7 @@
 """Limits from parameters: for every rig, and refused where a limit cannot be applied."""
 
 import math
+from dataclasses import replace
 from functools import partial
 
 import pytest
@@ -9,9 +10,10 @@ from rsea_ros.errors import ParameterError
 from rsea_ros.hardware.guarded import GuardedDevice
 from rsea_ros.hardware.limits import Rating
 from rsea_ros.hardware.simulated import SECOND, SimulatedDevice
+from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.rig_limits import check_travel
-from rsea_ros.nodes import _control, driver
+from rsea_ros.nodes import _control, _devices, driver
 from rsea_ros.nodes._devices import limits_of
 
 DEFAULTS = {parameter.name: parameter.default for parameter in driver.TABLE}
@@ -132,3 +134,41 @@ def test_60_newton_metres_on_a_free_end_are_refused_or_soon_a_fault(rig):
         if joint.fault is not None:
             break
     assert joint.fault.cause == "velocity" and abs(joint.state.position) < 1.0
+
+
+def effects(**parameters):
+    return RIG.with_effects(*(EffectSetting(name, values) for name, values in parameters.items()))
+
+
+RIG = load_rig("paper_high_impedance")
+STRIBECK = {"coulomb_torque": 2.0, "stribeck_torque": 1.0, "stribeck_velocity": 0.1, "creep_velocity": 2e-3}
+
+
+@pytest.mark.parametrize(
+    ("rig", "play", "friction", "late"),
+    [
+        (RIG, 0.0, 0.0, 0.0), (effects(backlash={"gap": 0.01}), 0.01 * 1530.456, 0.0, 0.0),
+        (effects(coulomb_friction={"torque": 4.0}), 0.0, 4.0, 0.0),
+        (effects(stribeck_friction=STRIBECK), 0.0, 2.0, 0.0),
+        (replace(RIG, sensors=RIG.sensors | {"ft": replace(RIG.sensors["ft"], delay=0.03)}), 0.0, 0.0, 0.03),
+    ],
+)  # fmt: skip
+def test_the_doubts_of_the_witnesses_are_those_of_the_rig(monkeypatch, rig, play, friction, late):
+    made = []
+    monkeypatch.setattr(_devices, "load_rig", lambda name: rig)
+    monkeypatch.setattr(_devices, "Witnesses", lambda *given: made.append(given))
+    _devices.witnesses_of(DEFAULTS | {"rate": 250.0}, Rating(torque=20.0))
+    ((spring, actuator, period),) = made
+    assert (spring.stiffness, period) == (1530.456, 0.004)
+    assert (actuator.damping, actuator.inertia, actuator.drag) == (3.0, 0.953, 23.088) and actuator.by_angle
+    spreads = [3.0 * rig.spread(n) for n in ("spring.stiffness", "rotor.reflected_inertia")]
+    assert actuator.bent == pytest.approx(math.hypot(0.2, spreads[0])) and actuator.driven == 0.3
+    assert actuator.risen == pytest.approx(max(0.3, spreads[1]))
+    assert actuator.dragged == pytest.approx(max(0.5, 3.0 * rig.spread("rotor.reflected_damping")))
+    assert actuator.play == pytest.approx(0.4 + play) and actuator.friction == pytest.approx(2.0 + friction)
+    assert (actuator.creep, actuator.late) == pytest.approx((2e-3, 0.01 + late))
+
+
+@pytest.mark.parametrize("rig", ["bare_drive", "pendulum"])
+def test_without_a_spring_nothing_witnesses(rig):
+    assert _devices.witnesses_of(DEFAULTS | {"rig": rig}) is None

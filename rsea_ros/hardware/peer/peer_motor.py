@@ -128,7 +128,8 @@ class EmulatedMotor:
     def _refusal(self, name: str, raw: bytes) -> int:
         register = self.model.registers[name]
         value = int.from_bytes(raw, "little", signed=register.signed)
-        if register.access is READ_ONLY or (register.access is EEPROM and self.get("torque_enable")):
+        on = "torque_enable" in self.model.registers and self.get("torque_enable")
+        if register.access is READ_ONLY or (register.access is EEPROM and on):
             return ACCESS
         if name == "torque_enable" and value and self.alert:
             return ACCESS

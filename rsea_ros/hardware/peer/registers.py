@@ -60,18 +60,22 @@ _PRO = {
     "hardware_error": Register(892, 1, READ_ONLY),
 }
 
-_PRO_A = {
+_COMMON = {
     "id": Register(7, 1, EEPROM, 0, 252, 1),
-    "baud": Register(8, 1, EEPROM, 0, 9, 3),
     "return_delay": Register(9, 1, EEPROM, 0, 254, 250),
     "drive_mode": Register(10, 1, EEPROM, 0, 13),
     "mode": Register(11, 1, EEPROM, 0, 16, 3),
     "homing_offset": Register(20, 4, EEPROM, -(2**31), 2**31 - 1, signed=True),
     "temperature_limit": Register(31, 1, EEPROM, 0, 100, 80),
+    "startup": Register(60, 1, EEPROM, 0, 3),
+}
+"""Of X and P."""
+
+_PRO_A = _COMMON | {
+    "baud": Register(8, 1, EEPROM, 0, 9, 3),
     "max_voltage": Register(32, 2, EEPROM, 150, 350, 350),
     "min_voltage": Register(34, 2, EEPROM, 150, 350, 150),
     "torque_limit": Register(38, 2, EEPROM, 0, 22740, 22740),
-    "startup": Register(60, 1, EEPROM, 0, 3),
     "shutdown": Register(63, 1, EEPROM, 0, 63, 58),
     "torque_enable": Register(512, 1, RAM, 0, 1),
     "status_level": Register(516, 1, RAM, 0, 2, 2),
@@ -93,18 +97,12 @@ _PRO_A = {
 def _x(current: int, voltage: tuple[int, int, int]) -> dict[str, Register]:
     """Return the table of an X motor: its largest current; lowest, highest and present voltage, 0.1 V."""
     low, high, now = voltage
-    return {
-        "id": Register(7, 1, EEPROM, 0, 252, 1),
+    return _COMMON | {
         "baud": Register(8, 1, EEPROM, 0, 7, 1),
-        "return_delay": Register(9, 1, EEPROM, 0, 254, 250),
-        "drive_mode": Register(10, 1, EEPROM, 0, 13),
-        "mode": Register(11, 1, EEPROM, 0, 16, 3),
         "homing_offset": Register(20, 4, EEPROM, -1_044_479, 1_044_479, signed=True),
-        "temperature_limit": Register(31, 1, EEPROM, 0, 100, 80),
         "max_voltage": Register(32, 2, EEPROM, low, high, high),
         "min_voltage": Register(34, 2, EEPROM, low, high, low),
         "torque_limit": Register(38, 2, EEPROM, 0, current, current),
-        "startup": Register(60, 1, EEPROM, 0, 3),
         "shutdown": Register(63, 1, EEPROM, 0, 63, 52),
         "torque_enable": Register(64, 1, RAM, 0, 1),
         "status_level": Register(68, 1, RAM, 0, 2, 2),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from dataclasses import replace
+from html import escape
 from typing import Any
 
 import numpy as np
@@ -15,10 +16,15 @@ from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.diagnosis.result import Cause, CauseParameter, Diagnosis, Experiment
 from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.effects.catalogue import catalogue
+from rsea_ros.errors import RigError
+from rsea_ros.library.diagnosed import Diagnosed
+from rsea_ros.library.result_figures import overlay_figure
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.records.record import Channel, Fault
+from rsea_ros.records.record import UNITS, Channel, Fault
 from rsea_ros.records.statistics import Z95
+from rsea_ros.report import words
 from rsea_ros.report.diagnosis.page import diagnosis_json, diagnosis_report
+from rsea_ros.report.figures import figure as fig
 from rsea_ros.report.result_files import DIAGNOSIS
 
 HEADINGS = (
@@ -137,3 +143,37 @@ def test_not_a_number_is_written_as_null(diagnosed) -> None:
         "kind": "clock_jump", "channel": "ft", "share": None, "detail": "3.7 s"
     }  # fmt: skip
     assert document["next_experiment"]["excitation"] == {"kind": "steps", "amplitude": None}
+
+
+def test_a_diagnosis_in_a_notebook_has_what_the_files_have(diagnosed, tmp_path) -> None:
+    found = Diagnosed(diagnosed.diagnosis, diagnosed.record)
+    (cause,) = found.causes
+    assert found.rig.effects[0].name == cause.name == "coulomb_friction"
+    assert found.rig.effects[0].parameters["torque"] == pytest.approx(3.0, rel=0.05)
+    assert found.alternatives == diagnosed.diagnosis.alternatives
+    assert found._repr_html_() == f"<pre>{escape(found.summary())}</pre>"
+    page = found.write_report(tmp_path / "out")
+    names = sorted(path.name for path in diagnosed.out.iterdir())
+    assert page == tmp_path / "out" / "report.html" and sorted(p.name for p in page.parent.iterdir()) == names
+    found.save(tmp_path / "model.yaml")
+    with pytest.raises(RigError, match="exists"):
+        found.save(tmp_path / "model.yaml")
+    found.save(tmp_path / "model.yaml", force=True)
+    assert load_rig(tmp_path / "model.yaml").effects == found.rig.effects
+    edit = found.edited(diagnosed.record, "coulomb_friction")
+    assert edit.error_before == pytest.approx(edit.noise, rel=0.3) and edit.error_after > 5.0 * edit.noise
+
+    drawn = found.plot()
+    before, after = diagnosed.diagnosis.before, diagnosed.diagnosis.after
+    assert len(drawn.data) == 3 * len(before) and drawn.layout.xaxis4.title.text == "s"
+    for k, (old, new) in enumerate(zip(before, after, strict=True)):
+        curves = drawn.data[3 * k : 3 * k + 3]
+        assert [c.name for c in curves] == ["measured", "simulated", "with the causes"]
+        assert [bool(c.showlegend) for c in curves] == [k == 0] * 3
+        assert len({c.line.color for c in curves}) == 3 and curves[0].x is not None
+        for curve, values in zip(curves, (old.measured, old.simulated, new.simulated), strict=True):
+            np.testing.assert_array_equal(curve.y, values)
+    assert drawn.layout.yaxis.title.text.endswith(f", {words.unit(UNITS[before[0].channel])}")
+    alone = overlay_figure(before[:1])
+    lines = [(c.name, c.line.color) for c in alone.data]
+    assert lines == [("measured", fig.MEASURED), ("simulated", fig.AFTER)]
