@@ -459,7 +459,7 @@ class Plant:
         run(self._machine, np.full(self._count, command), self._out, start=self._time)
         self._time += self._count * self._step
         values = self._out[-1]
-        if self._sensed:  # as `measure`, of all channels at once: a study of a controller takes 50 000 samples
+        if self._sensed:  # as `measure`, of all channels at once: a study takes 50 000 samples
             noisy = values[self._sensed] + self._noises * self._rng.standard_normal(len(self._sensed))
             rounded = np.round(noisy / self._quanta) * self._quanta
             values[self._sensed] = np.where(self._is_rounded, rounded, noisy)
