@@ -438,11 +438,11 @@ class Plant:
     def __init__(self, rig: Rig, rate: float, *, seed: int = 0, noise: bool = True) -> None:
         """rate: samples a second. Drifts reach their full size in a minute."""
         self._rig = rig
-        self._sensed = [k for k, name in enumerate(OUTPUTS) if noise and name in rig.sensors]
-        sensors = [rig.sensors[OUTPUTS[k]] for k in self._sensed]
+        self._seen = [k for k, name in enumerate(OUTPUTS) if noise and name in rig.sensors]
+        sensors = [rig.sensors[OUTPUTS[k]] for k in self._seen]
         self._noises, quanta = np.array([s.noise for s in sensors]), np.array([s.quantum for s in sensors])
-        self._is_rounded = quanta > SMALLEST
-        self._quanta = np.where(self._is_rounded, quanta, 1.0)
+        self._rounds = quanta > SMALLEST
+        self._quanta = np.where(self._rounds, quanta, 1.0)
         self._count = steps_per_sample(1.0 / rate)
         self._step = 1.0 / rate / self._count
         self._out = np.empty((self._count, len(OUTPUTS)))
@@ -459,9 +459,8 @@ class Plant:
         run(self._machine, np.full(self._count, command), self._out, start=self._time)
         self._time += self._count * self._step
         values = self._out[-1]
-        if self._sensed:  # as `measure`, of all channels at once: a study takes 50 000 samples
-            noisy = values[self._sensed] + self._noises * self._rng.standard_normal(len(self._sensed))
-            rounded = np.round(noisy / self._quanta) * self._quanta
-            values[self._sensed] = np.where(self._is_rounded, rounded, noisy)
+        if self._seen:  # as `measure`, of all channels at once: a study takes 50 000 samples
+            noisy = values[self._seen] + self._noises * self._rng.standard_normal(len(self._seen))
+            values[self._seen] = np.where(self._rounds, np.round(noisy / self._quanta) * self._quanta, noisy)
         position, velocity, torque, ft, deflection = values.tolist()
         return PlantSample(position, velocity, torque, math.nan if self._rig.rigid_spring else ft, deflection)

@@ -45,8 +45,7 @@ class Fraction:
 
     def __call__(self, s: complex | npt.NDArray[np.complexfloating]) -> ComplexArray:
         """Return the values at s, rad/s, of its shape."""
-        values: ComplexArray = np.polyval(self.numerator, s) / np.polyval(self.denominator, s)
-        return values
+        return np.asarray(np.polyval(self.numerator, s) / np.polyval(self.denominator, s))
 
 
 def distal_per_proximal(rig: Rig, sees: Sees = "spring_and_damper") -> TransferFunction:
