@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import fcntl
+import functools
 import gc
 import os
 import platform
@@ -91,6 +92,7 @@ TOGETHER = {
 """Files that one worker takes as one: what the first makes, or reads of every source, the others need."""
 
 
+@functools.cache  # asked of every file after every test
 def _place(nodeid: str) -> int:
     """Return where a test's file stands in the order of the files."""
     fits = lambda name: nodeid.startswith(f"test/{name}")  # noqa: E731

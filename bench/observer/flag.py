@@ -16,7 +16,7 @@ from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import measure, synthesize
 from rsea_ros.model.torque_band import TorqueBand
-from rsea_ros.model.transfer import end_over_end, frequency_response
+from rsea_ros.model.transfer import end_to_end, frequency_response
 from rsea_ros.nodes._model_health import CHANGED, EVERY
 from rsea_ros.records.record import Channel, FloatArray
 
@@ -192,7 +192,7 @@ def _verdict(flagged: ErrorFlag, t: float, distal: float, proximal: float) -> st
 
 def latency(rig: Rig, before: float, after: float, rate: float) -> float:
     """Return s from a sine at a part of the edge turning into one at another until the verdict is right."""
-    end, worst = end_over_end(rig), 0.0
+    end, worst = end_to_end(rig), 0.0
     right = PURE if after < 1.0 else BEYOND
     for phase in np.linspace(0.0, 2.0 * np.pi, 8, endpoint=False):
         flagged = ErrorFlag(rig)
@@ -212,7 +212,7 @@ def restless(rig: Rig) -> tuple[float, float]:
     Exact torques at 1 kHz: T_p is T_d over H, around the circle.
     """
     rate, count, rng = 1000.0, 60_000, np.random.default_rng(0)
-    hz, function = np.fft.rfftfreq(count, 1.0 / rate), end_over_end(rig)
+    hz, function = np.fft.rfftfreq(count, 1.0 / rate), end_to_end(rig)
     inverse = np.array([1.0 / function(2j * np.pi * f) for f in hz])
     worst = (0.0, 0.0)
     for top in np.arange(10.0, 120.0, 8.0):

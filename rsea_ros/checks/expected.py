@@ -79,14 +79,16 @@ def quotient(channel: str, t: FloatArray, y: FloatArray, p: FloatArray) -> Quoti
     period = float(np.median(np.diff(t)))
     even = np.arange(t[0], t[-1], period)
     y, p = (np.interp(even, t, v) for v in (y, p))
-    if len(even) < _FEWEST * _SEGMENTS or not (np.std(p) > 0.0 and np.std(y) > 0.0):
+    measured, predicted = float(np.std(y)), float(np.std(p))
+    if len(even) < _FEWEST * _SEGMENTS or not (predicted > 0.0 and measured > 0.0):
         return None
     longest = next_fast_length(max(_FEWEST, int(_LONGEST / period)))
     length = min(len(even) // _SEGMENTS, longest)
     pp = _segments(p, length)
-    if _captured_share(pp, p) < _ENOUGH:  # slow: its lines lie below those of short segments
+    if (captured := _captured_share(pp, p)) < _ENOUGH:  # slow: its lines lie below those of short segments
         length = len(even) // _SEGMENTS
         pp = _segments(p, length)
+        captured = _captured_share(pp, p)
     yy = _segments(y, length)
     cross = np.sum(yy * pp.conj(), axis=0)
     power_y, power_p = (np.sum(np.abs(v) ** 2, axis=0) + _TINY for v in (yy, pp))
@@ -104,8 +106,8 @@ def quotient(channel: str, t: FloatArray, y: FloatArray, p: FloatArray) -> Quoti
         value=s_yp / s_pp, coherence=coherence,
         sd=np.sqrt(np.maximum(1.0 - coherence, 1e-6) / (2.0 * np.maximum(coherence, 1e-9) * averages)),
         weight=np.add.reduceat(share, bands), segments=segments, lines=1.0 / float(np.sum(share**2)),
-        related=float(np.sum(share * np.abs(cross) ** 2 / (power_y * power_p))), measured=float(np.std(y)),
-        predicted=float(np.std(p)), captured=_captured_share(pp, p),
+        related=float(np.sum(share * np.abs(cross) ** 2 / (power_y * power_p))), measured=measured,
+        predicted=predicted, captured=captured,
     )
 
 

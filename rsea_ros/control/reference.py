@@ -126,7 +126,7 @@ class Reference:
         self.now = self.next = self._plant.c @ self._x
         self.promised = (desired, desired)
         self._yielding.start(ft)
-        self._parts = np.zeros(2)
+        self._parts, self._held = np.zeros(2), math.nan
         self.turning = self._turning = velocity
         self._angles = np.zeros(2)
 
@@ -135,10 +135,18 @@ class Reference:
         off = float(self.next[FT]) - self.promised[1]
         return self._inverse.torque(self._x, desired[: self._inverse.moves], off)
 
+    def _after(self, torque: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return the model's state and outputs at the end of the hold of a torque, and the load's parts."""
+        if torque != self._held:
+            x = self._plant.a @ self._x + self._plant.b * torque
+            seen: FloatArray = self._plant.c @ x
+            parts = self._yielding.after(0.5 * (float(self.next[FT]) + float(seen[FT])))
+            self._held, self._end = torque, (x, seen, parts)
+        return self._end
+
     def motion(self, torque: float) -> tuple[tuple[float, float], tuple[float, float]]:
         """Return speeds (rad/s) and angles (rad) at the two ends of the hold of a torque, with the load."""
-        after = self._plant.c @ (self._plant.a @ self._x + self._plant.b * torque)
-        parts = self._yielding.after(0.5 * (float(self.next[FT]) + float(after[FT])))
+        _, after, parts = self._after(torque)
         speeds = self._speed(self.next, self._parts), self._speed(after, parts)
         begin = float(self.next[POSITION]) + float(self._angles[1])
         return speeds, (begin, begin + 0.5 * self._law.period * sum(speeds))
@@ -146,7 +154,7 @@ class Reference:
     def more(self, torque: float) -> tuple[float, float, float]:
         """Return the torque that the load needs beyond the held rig, and beyond the rig's for all of the
         motion the learned drive, as it is commanded and as it acts: N m, means over the hold."""
-        after = self._plant.c @ (self._plant.a @ self._x + self._plant.b * torque)
+        _, after, _ = self._after(torque)
         (start, stop), _ = self.motion(torque)
         rise, mean = (stop - start) / self._law.period, 0.5 * (stop + start)
         held_rise = float(after[VELOCITY] - self.next[VELOCITY]) / self._law.period
@@ -160,9 +168,9 @@ class Reference:
     def advance(self, torque: float, promised: float) -> None:
         """Go on by a sample with a torque (N m) that was to lead to the promised one."""
         speeds, _ = self.motion(torque)
-        self._x = self._plant.a @ self._x + self._plant.b * torque
-        self.now, self.next = self.next, self._plant.c @ self._x
-        self._parts = self._yielding.advance(0.5 * (float(self.now[FT]) + float(self.next[FT])))
+        self._x, seen, self._parts = self._after(torque)
+        self.now, self.next, self._held = self.next, seen, math.nan
+        self._yielding.advance(0.5 * (float(self.now[FT]) + float(seen[FT])))
         self.turning, self._turning = self._turning, speeds[1]
         step = 0.5 * self._law.period * sum(speeds) - float(self.next[POSITION] - self.now[POSITION])
         self._angles = np.array([self._angles[1], self._angles[1] + step])

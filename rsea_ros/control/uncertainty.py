@@ -14,6 +14,7 @@ the current, at the motor on all torque, at the F/T sensor on ft. The law does n
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import product
 
 import numpy as np
@@ -136,7 +137,7 @@ class Family:
     path: ComplexArray
     current: ComplexArray
 
-    @property
+    @cached_property
     def nominal(self) -> npt.NDArray[np.bool_]:
         """Which cases are the rig itself, shape (m,)."""
         return np.array([case.nominal for case in self.cases])

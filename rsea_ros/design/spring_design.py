@@ -70,7 +70,7 @@ def spring_design(requirement: Requirement, unit: MotorGear, stiffness: float) -
     """Return the design of a stiffness (N m/rad). Raises ParameterError for one of no possible size."""
     mechanism.check_magnitude("stiffness", stiffness, "N m/rad")
     inner = requirement.inertia + unit.spin
-    function = transfer.end_over_end(rig_of(requirement, unit, stiffness))
+    function = transfer.end_to_end(rig_of(requirement, unit, stiffness))
     exact = transfer.flat_band(function, requirement.tolerance_db, requirement.tolerance_deg)
     band = transfer.pure_torque_bandwidth(stiffness, requirement.inertia)
     theta = float(mechanism.deflection(stiffness, requirement.torque))
@@ -119,7 +119,7 @@ def least_for_band(requirement: Requirement, unit: MotorGear) -> float:
     """Return the least K_s, N m/rad, whose exact band reaches the required one; bisection in log K_s."""
 
     def reaches(k_s: float) -> bool:
-        function = transfer.end_over_end(rig_of(requirement, unit, k_s))
+        function = transfer.end_to_end(rig_of(requirement, unit, k_s))
         band = transfer.flat_band(function, requirement.tolerance_db, requirement.tolerance_deg)
         return band >= requirement.bandwidth
 

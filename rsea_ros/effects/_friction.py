@@ -31,7 +31,7 @@ _PARTS = 4  # of a step in which it does not
 _SHRINKS = 0.9  # of Newton's last change: larger ones come from swinging about the knee of tanh
 
 
-@njit(inline="always")
+@njit(cache=True, error_model="numpy")
 def mean_friction(s, size, last, presliding):  # type: ignore[no-untyped-def]
     """Return the mean friction torque (N m, against motion when positive) of this step.
 
@@ -59,7 +59,7 @@ def mean_friction(s, size, last, presliding):  # type: ignore[no-untyped-def]
     return size * total / _PARTS
 
 
-@njit(inline="always")
+@njit(cache=True, error_model="numpy")
 def _implicit_mean(start, free, gain):  # type: ignore[no-untyped-def]
     """Return the mean of tanh over the path from start to end = free - gain * mean.
 
@@ -80,7 +80,7 @@ def _implicit_mean(start, free, gain):  # type: ignore[no-untyped-def]
     return mean - slope * change
 
 
-@njit(inline="always")
+@njit(cache=True, error_model="numpy")
 def mean_tanh(a, b, fade):  # type: ignore[no-untyped-def]
     """Return the mean of tanh over the straight path from a to b, and its slope by b. fade: exp(-2 |a|).
 

@@ -23,7 +23,7 @@ from rsea_ros.errors import ParameterError
 from rsea_ros.model.equations import with_structure
 from rsea_ros.model.observer import TorqueEstimate
 from rsea_ros.model.rig import Rig, check_two_torques
-from rsea_ros.model.transfer import edge_of_error, end_over_end, inner_inertia
+from rsea_ros.model.transfer import edge_of_error, end_to_end, inner_inertia
 from rsea_ros.records.record import HUGE, is_measured
 from rsea_ros.records.statistics import Z90
 
@@ -201,8 +201,8 @@ class ErrorFlag:
 
 def edge_of(rig: Rig, tolerance: float) -> Edge:
     """Return where |1/H - 1| reaches a tolerance, and its range over 90 % of b_s and J_m and over trains."""
-    edges = [edge_of_error(end_over_end(other), tolerance) for other in _possible(rig)]
-    return Edge(edge_of_error(end_over_end(rig), tolerance), min(edges), max(edges))
+    edges = [edge_of_error(end_to_end(other), tolerance) for other in _possible(rig)]
+    return Edge(edge_of_error(end_to_end(rig), tolerance), min(edges), max(edges))
 
 
 def _possible(rig: Rig) -> Iterator[Rig]:

@@ -437,7 +437,12 @@ class Plant:
 
     def __init__(self, rig: Rig, rate: float, *, seed: int = 0, noise: bool = True) -> None:
         """rate: samples a second. Drifts reach their full size in a minute."""
-        self._rig, self._noise = rig, noise
+        self._rig = rig
+        self._seen = [k for k, name in enumerate(OUTPUTS) if noise and name in rig.sensors]
+        sensors = [rig.sensors[OUTPUTS[k]] for k in self._seen]
+        self._noises, quanta = np.array([s.noise for s in sensors]), np.array([s.quantum for s in sensors])
+        self._rounds = quanta > SMALLEST
+        self._quanta = np.where(self._rounds, quanta, 1.0)
         self._count = steps_per_sample(1.0 / rate)
         self._step = 1.0 / rate / self._count
         self._out = np.empty((self._count, len(OUTPUTS)))
@@ -453,9 +458,9 @@ class Plant:
         """Hold a command (N m) for one sample period and return the measurement at its end."""
         run(self._machine, np.full(self._count, command), self._out, start=self._time)
         self._time += self._count * self._step
-        values = dict(zip(OUTPUTS, self._out[-1], strict=True))
-        if self._noise:
-            values = {n: float(measure(self._rig, n, v, self._rng)) for n, v in values.items()}
-        ft = math.nan if self._rig.rigid_spring else float(values["ft"])
-        position, velocity, torque = (float(values[n]) for n in ("position", "velocity", "motor_torque"))
-        return PlantSample(position, velocity, torque, ft, float(values["deflection"]))
+        values = self._out[-1]
+        if self._seen:  # as `measure`, of all channels at once: a study takes 50 000 samples
+            noisy = values[self._seen] + self._noises * self._rng.standard_normal(len(self._seen))
+            values[self._seen] = np.where(self._rounds, np.round(noisy / self._quanta) * self._quanta, noisy)
+        position, velocity, torque, ft, deflection = values.tolist()
+        return PlantSample(position, velocity, torque, math.nan if self._rig.rigid_spring else ft, deflection)

@@ -21,7 +21,7 @@ from rsea_ros.compiler import njit
 from rsea_ros.model.equations import with_structure
 from rsea_ros.model.observer import ErrorModel, TorqueEstimate
 from rsea_ros.model.rig import Rig, check_two_torques
-from rsea_ros.model.transfer import end_over_end, flat_band
+from rsea_ros.model.transfer import end_to_end, flat_band
 from rsea_ros.records.record import HUGE, FloatArray, is_measured
 
 DAMPING = math.sqrt(2.0)
@@ -164,7 +164,7 @@ class TorqueBand:
         Raises RigError for a rig without a spring: there is one torque, not two.
         """
         check_two_torques(rig)
-        self._function = end_over_end(with_structure(rig))
+        self._function = end_to_end(with_structure(rig))
         self.edge = flat_band(self._function, tolerance_db, tolerance_deg)
         self._limits, self._pair, self._period = np.array([*DEAF, quiet]), empty_pair(), math.nan
 

@@ -43,18 +43,17 @@ class Fraction:
     numerator: FloatArray
     denominator: FloatArray
 
-    def __call__(self, s: complex) -> complex:
-        """Return the value at s, rad/s."""
-        return complex(np.polyval(self.numerator, s) / np.polyval(self.denominator, s))
+    def __call__(self, s: complex | npt.NDArray[np.complexfloating]) -> ComplexArray:
+        """Return the values at s, rad/s, of its shape."""
+        return np.asarray(np.polyval(self.numerator, s) / np.polyval(self.denominator, s))
 
 
 def distal_per_proximal(rig: Rig, sees: Sees = "spring_and_damper") -> TransferFunction:
     """Return T_d / T_p while the motor drives. Both ends clamped: Eq. (6) with J_sc + n J_r for J_sc."""
-    return _transfer_function(distal_over_proximal(rig, sees))
+    return _transfer_function(_distal_over_proximal(rig, sees))
 
 
-def distal_over_proximal(rig: Rig, sees: Sees = "spring_and_damper") -> Fraction:
-    """Return the same as a fraction."""
+def _distal_over_proximal(rig: Rig, sees: Sees) -> Fraction:
     above, _ = _expand(rig, outputs.distal(rig, sees), "gear")
     below, _ = _expand(rig, outputs.proximal(rig), "gear")
     return _reduce(above, below)
@@ -121,7 +120,7 @@ def _reduce(numerator: FloatArray, denominator: FloatArray) -> Fraction:
 
 
 def _transfer_function(fraction: Fraction) -> TransferFunction:
-    from control import TransferFunction
+    from control import TransferFunction  # takes a second, which no verb waits for
 
     return TransferFunction(fraction.numerator, fraction.denominator)
 
@@ -195,23 +194,12 @@ def _factor(inertia: FloatArray) -> FloatArray:
     return np.where(inertia > 0.0, PAPER_FACTOR, FALL_FACTOR)
 
 
-def end_to_end(rig: Rig, sees: Sees = "spring_and_damper") -> TransferFunction:
+def end_to_end(rig: Rig, sees: Sees = "spring_and_damper") -> Fraction:
     """Return T_d / T_p of the rig with both ends clamped, exactly; Eq. (6) approximates it."""
-    return distal_per_proximal(_hold_ends(rig), sees)
+    return _distal_over_proximal(replace(rig, clamped=frozenset(END_NAMES)), sees)
 
 
-def end_over_end(rig: Rig) -> Fraction:
-    """Return the same as a fraction, for who cannot wait for python-control."""
-    return distal_over_proximal(_hold_ends(rig))
-
-
-def _hold_ends(rig: Rig) -> Rig:
-    return replace(rig, clamped=frozenset(END_NAMES))
-
-
-def flat_band(
-    function: TransferFunction | Fraction, tolerance_db: float = 3.0, tolerance_deg: float = 90.0
-) -> float:
+def flat_band(function: Fraction, tolerance_db: float = 3.0, tolerance_deg: float = 90.0) -> float:
     """Return the frequency, Hz, up to which a transfer function stays within tolerances of 1, or inf.
 
     Exact: |f|^2 = 10^(±dB/10) and tan(arg f) = ±tan(deg) are polynomials in the frequency. 90 degrees leave
@@ -245,7 +233,7 @@ def edge_of_error(function: Fraction, tolerance: float) -> float:
     return float(roots.min()) / (2.0 * math.pi) if len(roots) else math.inf
 
 
-def resonance_peak(function: TransferFunction) -> tuple[float, float]:
+def resonance_peak(function: Fraction) -> tuple[float, float]:
     """Return where |f| is highest, Hz, and how high, dB; (0, gain at rest) where it only falls."""
     top, bottom = (_inner(part, part) for part in _parts(function))
     slope = polynomial.polysub(
@@ -261,11 +249,9 @@ def resonance_peak(function: TransferFunction) -> tuple[float, float]:
 _Complex = tuple[FloatArray, FloatArray]
 
 
-def _parts(function: TransferFunction | Fraction) -> tuple[_Complex, _Complex]:
+def _parts(function: Fraction) -> tuple[_Complex, _Complex]:
     """Return numerator and denominator at s = i w: real and imaginary polynomials in w, lowest first."""
-    if isinstance(function, Fraction):
-        return _at_imaginary(function.numerator), _at_imaginary(function.denominator)
-    return _at_imaginary(function.num[0][0]), _at_imaginary(function.den[0][0])
+    return _at_imaginary(function.numerator), _at_imaginary(function.denominator)
 
 
 def _at_imaginary(highest_first: FloatArray) -> _Complex:

@@ -6,47 +6,43 @@ k_s: N m/rad; j_*: kg m^2; b_*: N m s/rad, at the gear output, but for `*_rotor`
 (times N^2 at the output). The term that Eqs. (5) to (7) leave out is in docs/physics.md.
 """
 
-from __future__ import annotations
-
 import math
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from control import TransferFunction
+import numpy as np
+
+from rsea_ros.model.transfer import Fraction
 
 EXACT_FACTOR = 1.0 - math.sqrt(0.5)
 """0.29289: in the place of 0.292: where an undamped |T_d / T_p| has risen by the factor sqrt(2)."""
 
 
-def _over(numerator: list[float], denominator: list[float]) -> TransferFunction:
-    from control import TransferFunction  # takes a second, which Eqs. (7) to (10) need not wait for
-
-    return TransferFunction(numerator, denominator)
+def _over(numerator: list[float], denominator: list[float]) -> Fraction:
+    return Fraction(np.array(numerator), np.array(denominator))
 
 
-def eq_1_lumped_distal_per_motor(k_s: float, j_eff: float, b_eff: float) -> TransferFunction:
+def eq_1_lumped_distal_per_motor(k_s: float, j_eff: float, b_eff: float) -> Fraction:
     """Return T_d / T_m = K_s / (J_eff s^2 + b_eff s + K_s), lumped. Paper, Eq. (1)."""
     return _over([k_s], [j_eff, b_eff, k_s])
 
 
-def eq_2_lumped_proximal_per_motor(k_s: float, j_eff: float, b_eff: float, b_s: float) -> TransferFunction:
+def eq_2_lumped_proximal_per_motor(k_s: float, j_eff: float, b_eff: float, b_s: float) -> Fraction:
     """Return T_p / T_m = (J_eff s^2 + b_s s + K_s) / (J_eff s^2 + b_eff s + K_s), lumped. Paper, Eq. (2)."""
     return _over([j_eff, b_s, k_s], [j_eff, b_eff, k_s])
 
 
-def eq_3_lumped_distal_per_proximal(k_s: float, j_eff: float, b_s: float) -> TransferFunction:
+def eq_3_lumped_distal_per_proximal(k_s: float, j_eff: float, b_s: float) -> Fraction:
     """Return T_d / T_p = K_s / (J_eff s^2 + b_s s + K_s), lumped. Paper, Eq. (3)."""
     return _over([k_s], [j_eff, b_s, k_s])
 
 
 def eq_5_proximal_per_motor(
     k_s: float, j_rotor: float, b_rotor: float, ratio: float, j_sc: float, b_s: float
-) -> TransferFunction:
+) -> Fraction:
     """Return T_p / T_m = (J_sc s^2 + b_s s + K_s) / (denominator of Eq. (4)). Paper, Eq. (5)."""
     return _over([j_sc, b_s, k_s], [j_rotor * ratio**2 + j_sc, b_rotor * ratio**2 + b_s, k_s])
 
 
-def eq_6_distal_per_proximal(k_s: float, j_sc: float, b_s: float) -> TransferFunction:
+def eq_6_distal_per_proximal(k_s: float, j_sc: float, b_s: float) -> Fraction:
     """Return T_d / T_p = K_s / (J_sc s^2 + b_s s + K_s). Paper, Eq. (6)."""
     return _over([k_s], [j_sc, b_s, k_s])
 

@@ -32,7 +32,9 @@ def running_integral(values: FloatArray, t: FloatArray) -> FloatArray:
 
 def segment_spectra(values: FloatArray, length: int) -> ComplexArray:
     """Return the spectrum of each segment of `length` samples, shape (segments, length // 2 + 1)."""
-    parts = np.lib.stride_tricks.sliding_window_view(values, length)[:: length - length // 2]
+    values, hop = np.ascontiguousarray(values), length - length // 2
+    shape, (width,) = (1 + (len(values) - length) // hop, length), values.strides
+    parts: FloatArray = np.ndarray(shape, values.dtype, values, strides=(hop * width, width))
     return np.asarray(np.fft.rfft((parts - parts.mean(axis=1, keepdims=True)) * hann(length), axis=1))
 
 

@@ -237,14 +237,15 @@ def _bag(path: Path) -> str:
     """Return the sums of every tenth message's numbers, topic by topic, read by another library."""
     lines = []
     with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_JAZZY)) as reader:
-        for connection in sorted(reader.connections, key=lambda c: c.topic):
-            stamps, fields = [], {}
-            for k, (_, stamp, raw) in enumerate(reader.messages([connection])):
-                stamps.append(stamp)
-                if k % TENTH:
-                    continue
+        heard = {c.id: (list[int](), dict[str, list[float]]()) for c in reader.connections}
+        for connection, stamp, raw in reader.messages():  # once for all topics: it parses all for each
+            stamps, fields = heard[connection.id]
+            if len(stamps) % TENTH == 0:
                 for name, value in _fields(reader.deserialize(raw, connection.msgtype)):
                     fields.setdefault(name, []).append(value)
+            stamps.append(stamp)
+        for connection in sorted(reader.connections, key=lambda c: c.topic):
+            stamps, fields = heard[connection.id]
             span = (stamps[-1] - stamps[0]) * 1e-9 if stamps else 0.0
             lines.append(f"{connection.topic} {connection.msgtype}: {len(stamps)} in {span:.6g} s")
             lines += [f"  {n}: {sums(v)}" for n, v in fields.items() if any(v)]

@@ -12,7 +12,7 @@ from rsea_ros.errors import ParameterError, RigError
 from rsea_ros.model.observer import TorqueEstimate
 from rsea_ros.model.pure_torque_error import BEYOND, NOTHING, PURE, ErrorFlag, ErrorSettings, edge_of
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.model.transfer import end_over_end, flat_band
+from rsea_ros.model.transfer import end_to_end, flat_band
 from rsea_ros.paper.claims import PROTOTYPE_TRAINS
 
 RATE = 1000.0
@@ -22,7 +22,7 @@ SETTINGS = ErrorSettings()
 
 def ends(rig, lines):
     """T_d and T_p of a spectrum of T_d around a circle of RATE, N m."""
-    function, count = end_over_end(rig), 2 * (len(lines) - 1)
+    function, count = end_to_end(rig), 2 * (len(lines) - 1)
     hz = np.fft.rfftfreq(count, 1.0 / RATE)
     inverse = np.array([1.0 / function(2j * np.pi * f) for f in hz])
     return np.fft.irfft(lines, count), np.fft.irfft(lines * inverse, count)
@@ -100,7 +100,7 @@ def test_the_latency_is_at_most_the_window(rig, before, after):
 def test_the_edge_is_where_a_dense_search_first_leaves_the_tolerance():
     hz = np.arange(0.01, 100.0, 0.01)
     for rig in (PLATFORM, KNEE):
-        function = end_over_end(rig)
+        function = end_to_end(rig)
         error = np.array([abs(1.0 / function(2j * np.pi * f) - 1.0) for f in hz])
         assert edge_of(rig, 0.3).hz == pytest.approx(hz[np.argmax(error > 0.3)], abs=0.011)
 
@@ -128,7 +128,7 @@ def test_the_edges_move_with_the_damping(damping, error_hz, band_hz):
     inertia, w = 0.0040 + 0.953 / 502, 2.0 * math.pi * edge_of(rig, 0.3).hz
     assert inertia * w**2 == pytest.approx(0.3 * abs(1530.456 + 1j * damping * w), rel=1e-9)
     assert edge_of(rig, 0.3).hz == pytest.approx(error_hz, abs=0.06)
-    assert flat_band(end_over_end(rig), 3.0, 30.0) == pytest.approx(band_hz, abs=0.06)
+    assert flat_band(end_to_end(rig), 3.0, 30.0) == pytest.approx(band_hz, abs=0.06)
 
 
 def test_the_interval_has_no_end_where_the_spin_may_cancel_the_chassis():

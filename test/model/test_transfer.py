@@ -86,7 +86,7 @@ def test_the_high_impedance_response_is_the_papers_but_for_the_rotors_spin():
     )
     agree(
         proximal_per_motor(rig)(S) * (J_EFF * S**2 + B_EFF * S + K_S),
-        eq_5.num[0][0] @ [S**2, S, S**0],
+        eq_5.numerator @ [S**2, S, S**0],
     )
     agree(
         transfer.distal_per_proximal(rig, "element")(S),
