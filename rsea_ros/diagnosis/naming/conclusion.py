@@ -58,7 +58,8 @@ def cause_of(
     where its residual falls.
     """
     (without, with_it), effect = step, effect_named(step[1].added)
-    channel, held_out, interval = own_gain(step, channel, settings)
+    channel = _helped_channel(without.test, with_it.test, channel, settings.sizes)
+    held_out, interval = gain(with_it.test, without.test, channel, settings.acceptance.resamples)
     train, _ = gain(with_it.train, without.train, channel)
     return Cause(
         name=effect.name,
@@ -68,15 +69,6 @@ def cause_of(
         channel=channel, status=named.status or "leading", probability=named.probability,
         confusable_with=tuple(w.claim.name for w, _ in named.rivals) if named.status == "one_of" else (),
     )
-
-
-def own_gain(
-    step: tuple[Evaluated, Evaluated], channel: str, settings: DiagnosisSettings
-) -> tuple[str, float, tuple[float, float]]:
-    """Return the channel that a step's cause helps, and its gain there on held-out data with interval."""
-    without, with_it = step
-    channel = _helped_channel(without.test, with_it.test, channel, settings.sizes)
-    return channel, *gain(with_it.test, without.test, channel, settings.acceptance.resamples)
 
 
 def _helped_channel(without: Score, with_it: Score, channel: str, rule: SizeSettings) -> str:
@@ -155,15 +147,18 @@ def rejected_trial(trial: Trial, held_out: HeldOut, channel: str) -> Rejected:
 
 
 def dropped_cause(
-    without: Evaluated, with_it: Evaluated, naming: Mapping[str, Named], channel: str
+    without: Evaluated, with_it: Evaluated, naming: Mapping[str, Named], channel: str, reached: float
 ) -> Rejected:
-    """Return an accepted effect that may not be named, with its gain in the channel that it helps most."""
+    """Return an accepted effect that may not be named, with its gain in the channel that it helps most.
+
+    reached: of the noise, up to which only that is left.
+    """
     named = naming.get(with_it.added)
     if named is None:
         return Rejected(with_it.added, gain(with_it.test, without.test, channel)[0], "leaves_too_much")
     evidence = named.cause.evidence
-    reason: Reason = "improbable" if evidence.is_sure else "leaves_too_much"
-    reason = reason if named.has_gain else "not_sure"
+    unsure: Reason = "leaves_too_much" if evidence.left > reached else "not_sure"
+    reason: Reason = "improbable" if evidence.is_sure else unsure
     return Rejected(with_it.added, evidence.gain, reason, probability=named.probability)
 
 
@@ -224,9 +219,10 @@ def outcome_of(
     if channel is None:
         source = examined.records[0].source
         raise IdentificationError(f"{source}: no sample is left to test on, expected a longer record")
-    naming = with_sure_gains(naming_of(places, stages, settings), stages, channel, settings)
+    naming = naming_of(places, stages, settings)
     steps = itertools.pairwise(stages)
-    dropped = tuple(dropped_cause(a, b, naming, channel) for a, b in steps if not is_named(b, naming))
+    unnamed = [(a, b) for a, b in steps if not is_named(b, naming)]
+    dropped = tuple(dropped_cause(a, b, naming, channel, levels.reached) for a, b in unnamed)
     stages = without_unnamed_end(stages, naming)
     naming = with_sizes_known(naming, stages, settings)
     statuses = [naming[s.added].status if s.added in naming else None for s in stages[1:]]
@@ -245,31 +241,10 @@ def naming_of(
     places: Sequence[CauseAndRivals], stages: Sequence[Evaluated], settings: DiagnosisSettings
 ) -> dict[str, Named]:
     """Return the naming of each cause."""
-    at_floor, needed = is_at_floor(stages[-1].test, settings.floor), on_the_way(stages, settings)
+    *before, at_floor = (is_at_floor(stage.test, settings.floor) for stage in stages)
+    steps = zip(stages[1:], before, strict=True)
+    needed = {stage.added for stage, reached in steps if at_floor and not reached}
     return {n.cause.evidence.name: n for n in name_causes(places, at_floor, needed, settings)}
-
-
-def on_the_way(stages: Sequence[Evaluated], settings: DiagnosisSettings) -> set[str]:
-    """Return the causes without which more than noise is left, where all together leave only that."""
-    *before, last = (is_at_floor(stage.test, settings.floor) for stage in stages)
-    return {stage.added for stage, reached in zip(stages[1:], before, strict=True) if last and not reached}
-
-
-def with_sure_gains(
-    naming: Mapping[str, Named], stages: Sequence[Evaluated], channel: str, settings: DiagnosisSettings
-) -> dict[str, Named]:
-    """Return the naming with no cause named whose own gain on held-out data may be none.
-
-    Except on the way to nothing but noise: of two that act together each may gain nothing alone.
-    """
-    needed = on_the_way(stages, settings)
-    steps = [step for step in itertools.pairwise(stages) if step[1].added not in needed]
-    gains = {step[1].added: own_gain(step, channel, settings) for step in steps}
-    unsure = {name for name, (_, _, (low, _)) in gains.items() if not low > 0.0}
-    return {
-        name: replace(by, status=None, has_gain=False) if name in unsure else by
-        for name, by in naming.items()
-    }
 
 
 def with_sizes_known(

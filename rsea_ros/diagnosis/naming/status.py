@@ -86,16 +86,12 @@ def probability(
 
 @dataclass(frozen=True)
 class Named:
-    """A weighed cause with its probability and status (None: not to be named), and its rivals with theirs.
-
-    has_gain: it surely lowers the residual of held-out data by itself.
-    """
+    """A weighed cause with its probability and status (None: not to be named), and its rivals with theirs."""
 
     cause: Weighed
     probability: float
     status: Status | None
     rivals: tuple[tuple[Weighed, float], ...]
-    has_gain: bool = True
 
 
 def name_causes(

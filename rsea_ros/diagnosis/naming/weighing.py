@@ -40,18 +40,10 @@ from rsea_ros.records.record import FloatArray
 from rsea_ros.records.statistics import Z95
 
 
-@dataclass(frozen=True)
-class Contest:
-    """A cause that was accepted and its rivals, the likeliest first."""
-
-    cause: Claim
-    rivals: tuple[Claim, ...]
-
-
 def contests(
     selection: Selection, stages: Sequence[Evaluated], held_out: HeldOut, pools: Pools
-) -> list[Contest]:
-    """Return the contest for the place of each accepted cause, in the order of the stages."""
+) -> list[list[Claim]]:
+    """Return each accepted cause and its rivals, the likeliest first, in the order of the stages."""
     last = stages[-1].solution
     claims = [
         Claim(with_it.added, last.problem, last.theta, with_it.test, without.test, 1.0)
@@ -60,7 +52,7 @@ def contests(
     return [weigh_rivals(selection, claim, held_out, pools) for claim in claims]
 
 
-def weigh_rivals(selection: Selection, claim: Claim, held_out: HeldOut, pools: Pools) -> Contest:
+def weigh_rivals(selection: Selection, claim: Claim, held_out: HeldOut, pools: Pools) -> list[Claim]:
     """Return a cause and its rivals, weighed beside all the other causes.
 
     Another cause that was accepted too is no rival, whichever of the two came first. Where the accepted model
@@ -90,7 +82,7 @@ def weigh_rivals(selection: Selection, claim: Claim, held_out: HeldOut, pools: P
         if weight >= rule.least_weight
     ]
     heaviest = sorted(claims, key=lambda c: -c.weight)[: rule.most_rivals]
-    return Contest(replace(claim, weight=weights[0]), tuple(heaviest))
+    return [replace(claim, weight=weights[0]), *heaviest]
 
 
 def _of_its_step(selection: Selection, claim: Claim) -> list[Trial]:
@@ -221,7 +213,7 @@ def weigh(
 ) -> list[CauseAndRivals]:
     """Return every accepted cause and its rivals with the evidence for each, in the order of the stages."""
     contested = contests(selection, stages, held_out, pools)
-    claims = [c for contest in contested for c in (contest.cause, *contest.rivals)]
+    claims = list(itertools.chain.from_iterable(contested))
     weigh_claim = partial(evidence_for, cases=selection.cases, settings=settings, run=pools.run)
     evidence_by_claim = {id(c): e for c, e in zip(claims, pools.fits.map(weigh_claim, claims), strict=True)}
 
@@ -229,7 +221,7 @@ def weigh(
         return tuple(Weighed(c, e) for c in group if (e := evidence_by_claim[id(c)]) is not None)
 
     return [
-        CauseAndRivals(cause[0], with_evidence(contest.rivals))
-        for contest in contested
-        if (cause := with_evidence([contest.cause]))
+        CauseAndRivals(cause[0], with_evidence(rivals))
+        for claim, *rivals in contested
+        if (cause := with_evidence([claim]))
     ]

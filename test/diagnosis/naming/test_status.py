@@ -23,6 +23,7 @@ from rsea_ros.diagnosis.naming.status import (
     probability,
     status_of,
 )
+from rsea_ros.diagnosis.naming.weighing import CauseAndRivals, Weighed
 from rsea_ros.diagnosis.result import CauseParameter
 from rsea_ros.diagnosis.score import Score
 from rsea_ros.diagnosis.settings import DEFAULT
@@ -210,11 +211,9 @@ def score_of(ratios):
     return Score(sums, {n: np.full(4, 100.0) for n in ratios})
 
 
-@pytest.mark.parametrize(
-    ("left", "status"), [((1.0, 1.0, 1.0), None), ((3.0, 3.0, 1.0), "leading"), ((3.0, 1.0, 1.0), "leading")]
-)
+@pytest.mark.parametrize("left", [(3.0, 3.0, 1.0), (3.0, 1.0, 1.0), (3.0, 2.0, 2.0)])
 @pytest.mark.parametrize("name", ["backlash", "damping_drift"])
-def test_where_only_noise_is_left_already_a_cause_is_named_only_for_a_sure_gain(left, status, name):
+def test_where_only_noise_is_left_already_a_cause_is_named_only_for_a_sure_gain(left, name):
     """A drift of -0.002 % was named in a clean record, a mode beside two delays that left nothing of it.
 
     left: times the noise, without a cause, with backlash and with both. Of two that act together the first
@@ -222,9 +221,10 @@ def test_where_only_noise_is_left_already_a_cause_is_named_only_for_a_sure_gain(
     """
     steps = zip(("", "backlash", "damping_drift"), left, strict=True)
     stages = [SimpleNamespace(added=n, test=score_of({"ft": level})) for n, level in steps]
-    named = outcome.with_sure_gains({name: Named(None, 0.2, "leading", ())}, stages, "ft", DEFAULT)
-    is_needless = name == "damping_drift" and left[1] == 1.0
-    assert named[name].status == (None if is_needless else status)
+    evidence = replace(RIGHT, name=name, is_sure=False)
+    place = CauseAndRivals(Weighed(None, evidence), ())
+    is_needless = (name == "damping_drift" and left[1] == 1.0) or left[2] > 1.0
+    assert (outcome.naming_of([place], stages, DEFAULT)[name].status is None) == is_needless
 
 
 @given(RATIOS | NEAR)
