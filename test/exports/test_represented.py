@@ -162,7 +162,7 @@ def test_an_effect_at_its_null_value_is_not_exported(target):
     assert [name for name, why in made.leaves_out.items() if "inf" in why] == ["voltage_sag"]
 
 
-@pytest.mark.parametrize("target", EXPORTS.keys() - {"feedforward"})  # whose inputs a controller has
+@pytest.mark.parametrize("target", [n for n in EXPORTS if n != "feedforward"])  # whose inputs are computed
 def test_a_sensor_that_is_read_late_is_left_out_by_name(target):
     rig = load_rig("paper_high_impedance")
     late = replace(rig, sensors={**rig.sensors, "ft": replace(rig.sensors["ft"], delay=4e-3)})
