@@ -18,7 +18,7 @@ from rsea_ros.checks.linearised_rig import Number
 from rsea_ros.checks.rig_findings import clock_findings
 from rsea_ros.cli.main import main
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.records.record import Channel
+from rsea_ros.records.record import Channel, Record
 
 RIG = load_rig("paper_high_impedance")
 
@@ -141,6 +141,19 @@ def test_a_sensor_on_another_clock_is_not_taken_for_dead_or_for_another_rig():
     findings = check_record(shift_stamps(-1.8, "ft"), RIG)
     assert off(findings) == {"ft": pytest.approx(-1.8, abs=0.01)}
     assert {f.kind for f in findings.findings if f.light == "red"} == {"clock_offset"}
+
+
+@pytest.mark.parametrize("masks", [True, False])
+def test_a_sensor_whose_late_stamps_the_others_convict_takes_no_part_in_a_fit(masks):
+    """A torque constant of 0.245 stood in for an F/T sensor that came later and later, up to 0.36 s."""
+    findings = check_record(shift_stamps(-1.8, "ft"), RIG)
+    kept = with_faults(good(), findings, masks=masks)
+    assert good().channels.keys() - kept.channels.keys() == {"ft"}
+    assert [f.detail.split(",")[0] for f in kept.faults if f.kind == "clock_offset"] == ["left out"]
+    moved = check_record(shift_stamps(1.7, "command"), RIG)
+    assert with_faults(good(), moved, masks=masks).channels.keys() == good().channels.keys()
+    alone = Record({n: good()[n] for n in ("command", "ft")})
+    assert with_faults(alone, findings, masks=masks).channels.keys() == alone.channels.keys()
 
 
 def test_a_lag_is_not_read_from_a_sine_that_fits_many():
