@@ -9,6 +9,8 @@ gear does.
 
 from __future__ import annotations
 
+import math
+
 from rsea_ros.control.controller import Measurement
 from rsea_ros.control.sign_change import SignChange
 from rsea_ros.control.sign_evidence import DOUBT, MOVED, POWER, RIGHT, SIGNS, SWAY, SignEvidence
@@ -107,7 +109,8 @@ class Polarity:
         """Return a contradiction under torque, in words; empty without one."""
         heard = self._seen.hear(reading, self._sent[1], missed, keep=False)
         self._made = [self._seen.made[1], *self._made[:-1]]
-        before, self._state = self._state, (reading.position, reading.velocity, reading.motor_torque)
+        made = reading.motor_torque if is_measured(reading.motor_torque, HUGE) else math.inf
+        before, self._state = self._state, (reading.position, reading.velocity, made)
         self._alike = self._alike + 1 if self._state == before else 0
         left_behind = self._left_behind(reading)
         if self._alike * self._h > FROZEN and left_behind > STUCK * self._pulse:
@@ -138,11 +141,14 @@ class Polarity:
     def _left_behind(self, reading: Measurement) -> float:
         """Return what repeating states did not follow, N m: motor torque its command, position its velocity.
 
-        Without a motor torque a gear that sticks repeats rightly, whatever is commanded.
+        Without a motor torque a gear that sticks is right, as far as ft and friction hold the command.
         """
         acted = [self._sent[-1], *(self._asked if self._alike else ())]
         self._asked = min(acted), max(acted)
-        asked = self._asked[1] - self._asked[0] if is_measured(reading.motor_torque, HUGE) else 0.0
+        asked = self._asked[1] - self._asked[0]
+        if not is_measured(reading.motor_torque, HUGE):
+            ft = reading.ft if is_measured(reading.ft, HUGE) else 0.0
+            asked = min(asked, abs(self._sent[-1] - ft) - 2.0 * self._friction)
         return max(asked, self._stiffness * abs(reading.velocity) * self._alike * self._h)
 
     def _unless_frozen(self, words: str) -> str:

@@ -179,20 +179,22 @@ def test_states_that_stand_still_are_named_and_not_the_sensor_that_is_right(rig,
     assert "joint_states repeat one value" in polarity.contradiction and k < 285 + 20
 
 
-@pytest.mark.parametrize(("velocity", "told"), [(0.0, False), (0.05, False), (0.5, True)])
-def test_without_a_motor_torque_states_that_repeat_are_frozen_only_where_they_say_that_they_move(
-    velocity, told
+@pytest.mark.parametrize(
+    ("friction", "velocity", "told"),
+    [(15.0, 0.0, False), (15.0, 0.02, False), (15.0, 0.5, True), (5.0, 0.0, True)],
+)
+def test_without_a_motor_torque_states_that_repeat_are_frozen_beyond_what_friction_holds(
+    friction, velocity, told
 ):
     """A gear that sticks was "joint_states repeat one value" whenever the command changed by 2 N m.
 
-    K w t = 248 * 0.5 * 0.02 = 2.5 N m of spring in 20 ms, 0.25 at a tenth of that speed.
+    Commands of up to 21 N m: twice 15 of friction hold them, twice 5 do not. K w t is 15 N m of
+    spring in 20 ms at 0.5 rad/s, 0.6 at 0.02. An absent torque is another NaN in every message.
     """
     polarity = Polarity(RIG, RATE, LIMIT)
-    polarity.proven = True
-    reading = Measurement(0.0, velocity, 0.1)
-    words = ""
-    for k in range(8):
-        words = polarity.watch(reading)
+    polarity.proven, polarity._friction, words = True, friction, ""
+    for k in range(12):
+        words = polarity.watch(Measurement(0.0, velocity, 0.1, float("nan")))
         polarity.sent(3.0 * k)
     assert ("joint_states repeat one value" in words) is told
 
