@@ -134,8 +134,8 @@ class Polarity:
         self._off = self._off + 1 if off > allowed and flipped[name] < EXPLAINED * off else 0
         self._friction += self._h / LONG * (min(off, allowed) - self._friction)
         if self._off >= CYCLES:  # two samples do not tell a sign from a gain
-            made = f"motor torque is {self._made[0]:.3g} N·m, ft {ft:.3g}, J w' + b w {motion:.3g}"
-            self._contradict(self._unless_frozen(f"{made}, as with another gain or with {name} reversed"))
+            torques = f"motor torque is {self._made[0]:.3g} N·m, ft {ft:.3g}, J w' + b w {motion:.3g}"
+            self._contradict(self._unless_frozen(f"{torques}, as with another gain or with {name} reversed"))
         return self.contradiction
 
     def _left_behind(self, reading: Measurement) -> float:
