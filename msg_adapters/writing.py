@@ -64,7 +64,8 @@ class BagWriter:
         self._span = (0, 0)
         self._flushed = time.monotonic()
         self._disk = ThreadPoolExecutor(1, "disk")
-        self._syncing: Future[None] | None = None
+        self._syncing = Future[None]()
+        self._syncing.set_result(None)
         self._stage: LockedFolder | None = None
 
     def __enter__(self) -> BagWriter:
@@ -144,11 +145,10 @@ class BagWriter:
 
     def _sync(self) -> None:
         """Put flushed data on the disk, unless the previous sync is still running."""
-        if self._syncing is not None and not self._syncing.done():
+        if not self._syncing.done():
             return
         with self._name_failure():
-            if self._syncing is not None:
-                self._syncing.result()
+            self._syncing.result()
         self._syncing = self._disk.submit(self._storage.sync)
 
     def __exit__(
@@ -159,6 +159,7 @@ class BagWriter:
             self._disk.shutdown()
             try:
                 if complete:
+                    self._syncing.result()
                     self._complete()
             except OSError as failure:
                 complete = False
@@ -236,6 +237,5 @@ class BagWriter:
 
     def _error(self, error: OSError) -> BagError:
         kept = f"; what was written until then is in {self.partial}" if self._recording else ""
-        if isinstance(error, OutputError):
-            return BagError(f"{error}{kept}")
-        return BagError(f"{self.path}: cannot be written: {error.strerror or error}{kept}")
+        is_told, why = isinstance(error, OutputError), error.strerror or error
+        return BagError(f"{error if is_told else f'{self.path}: cannot be written: {why}'}{kept}")

@@ -1,5 +1,7 @@
 """A power cut or a failing disk under a recording: everything that was on the disk is kept."""
 
+from threading import Event
+
 import pytest
 
 from msg_adapters import BagWriter, iterate
@@ -31,8 +33,7 @@ def test_a_power_cut_loses_one_interval_at_most(tmp_path, monkeypatch, interval)
         for k in range(1, 1000):
             bag.write("/a", "std_msgs/msg/Bool", k, BOOL)
             cut.now = 0.01 * k
-            if bag._syncing is not None:
-                bag._syncing.result()
+            bag._syncing.result()
         raise RuntimeError
     (file,) = bag.partial.iterdir()
     file.write_bytes(file.read_bytes()[: cut.safe])
@@ -54,6 +55,23 @@ def test_a_disk_that_fails_under_a_recording_is_reported_and_the_rest_is_kept(tm
             cut.now = 1.1 * k
             bag.write("/a", "std_msgs/msg/Bool", k, BOOL)
     assert len(list(iterate(bag.partial))) >= 1
+
+
+def test_a_disk_that_fails_at_the_last_moment_is_reported_too(tmp_path, monkeypatch):
+    cut, answer = PowerCut(monkeypatch, McapStorage), Event()
+
+    def break_power(storage):
+        answer.wait()
+        raise OSError(5, "Input/output error")
+
+    monkeypatch.setattr(McapStorage, "sync", break_power)
+    line = "cannot be written: Input/output error"
+    with pytest.raises(BagError, match=line), BagWriter(tmp_path / "bag") as bag:
+        for k in (1, 2):
+            cut.now = 1.1 * k
+            bag.write("/a", "std_msgs/msg/Bool", k, BOOL)
+        answer.set()
+    assert len(list(iterate(bag.partial))) == 2
 
 
 def test_a_recording_without_new_messages_is_flushed(tmp_path, monkeypatch):
