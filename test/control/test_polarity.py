@@ -206,3 +206,19 @@ def test_a_blow_to_a_free_load_is_no_changed_sign():
         ft, speed = (2.0 if k < 290 else -2.0), 0.01
         reading = Measurement(ft, speed, speed * k / RATE, ft + damping * speed)
         assert change.take(reading, 0.0, 0) == ""
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf, 1e300, -1e300, 9e5])
+@pytest.mark.parametrize("name", ["ft", "velocity", "position", "motor_torque"])
+def test_a_value_that_is_no_measurement_ends_no_controller(name, bad):
+    """One velocity of 1e300 ended its process with an OverflowError; the motor kept 10 N·m for 72 ms."""
+    plant, polarity = Plant(RIG, RATE), Polarity(RIG, RATE, LIMIT)
+    for k in range(120):
+        torque = 5.0 * math.sin(0.1 * k)
+        reading = measured(plant.step(torque), {})
+        if k in (60, 90, 91):
+            reading = replace(reading, **{name: bad})
+        polarity.watch(reading)
+        polarity.sent(torque)
+    if abs(bad) != 9e5:
+        assert not polarity.contradiction
