@@ -28,7 +28,7 @@ from rsea_ros.control.following import UNLIMITED
 from rsea_ros.control.law import law_of, z_of
 from rsea_ros.control.link import LinkShare
 from rsea_ros.control.margins import distal_responses
-from rsea_ros.control.prediction import AHEAD, ALONG, SMOOTH, gains_of
+from rsea_ros.control.prediction import AHEAD, SMOOTH, course, gains_of
 from rsea_ros.control.synthesis import ControllerDesign
 from rsea_ros.model import outputs
 from rsea_ros.model.equations import COORDINATES, PORTS, D
@@ -47,9 +47,9 @@ def prediction_response(corner: float, period: float, hz: FloatArray) -> Complex
     g = gains_of(math.exp(-2.0 * math.pi * corner * period))
     z = z_of(period, hz)
     first = np.array([1.0, 0.0, 0.0])
-    to_state = np.eye(3) - (np.eye(3) - np.outer(g, first)) @ ALONG / z[:, None, None]
+    to_state = np.eye(3) - (np.eye(3) - np.outer(g, first)) @ course(1.0) / z[:, None, None]
     states = np.linalg.solve(to_state, np.broadcast_to(g.astype(complex)[:, None], (len(z), 3, 1)))[..., 0]
-    rates = ALONG[0] * [1.0, AHEAD, AHEAD * AHEAD]
+    rates = course(1.0)[0] * [1.0, AHEAD, AHEAD * AHEAD]
     response: ComplexArray = (1.0 + states[:, 1:] @ rates[1:]) / z**AHEAD
     return response
 

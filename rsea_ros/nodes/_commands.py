@@ -13,11 +13,12 @@ WATCHDOG = 50 * MILLISECOND
 
 
 class PendingCommand(NamedTuple):
-    """A command until it is due: when it takes effect and when it came, ns; torque N m."""
+    """A command until it is due: when it takes effect, when it came, and its stamp, ns; torque N m."""
 
     when: int
     torque: float
     arrival: int
+    stamp: int
 
 
 class CommandQueue:
@@ -29,7 +30,8 @@ class CommandQueue:
     their stamp). A command that takes effect at once overtakes earlier waiting ones. One that is not finite,
     or beyond NONSENSE times the limit, is dropped (`refused`). 50 ms after the last command the torque is
     zero (`expired` counts how often).
-    first: the first one (N m) since the last `clear`, whether it ever took effect or not.
+    first: the first one (N m) since the last `clear`, whether it ever took effect or not. stamp: ns, of the
+    torque in force, also where that came too late for it.
     strict, as in front of a real machine: a stamp further than 0.3 s from now is `refused` too, unless there
     is none, and the last torque stays in force: the machine's limits end it.
     """
@@ -41,7 +43,7 @@ class CommandQueue:
         self._waiting: list[PendingCommand] = []
         self._taken_until = self._from = 0
         self._newest: int | None = None
-        self.torque, self.furthest = 0.0, 0.0
+        self.stamp, self.torque, self.furthest = 0, 0.0, 0.0
         self.first: float | None = None
         self.late = self.unstamped = self.off = self.refused = self.expired = self.dropped = 0
 
@@ -65,7 +67,7 @@ class CommandQueue:
             self.first = torque if self.first is None else self.first
             if stamp <= now:
                 self._waiting = [w for w in self._waiting if w.when <= now]
-            self._waiting.append(PendingCommand(max(stamp, self._taken_until), torque, now))
+            self._waiting.append(PendingCommand(max(stamp, self._taken_until), torque, now, stamp))
             self._waiting.sort(key=lambda waiting: waiting.when)  # of one instant, the last that came counts
 
     def refuse(self) -> None:
@@ -80,11 +82,12 @@ class CommandQueue:
             self._waiting = self._waiting[len(due) :]
             self._taken_until = until
             if due:
-                self.torque, self._newest = due[-1].torque, max(due[-1].when, due[-1].arrival)
+                self.torque, self.stamp = due[-1].torque, due[-1].stamp
+                self._newest = max(due[-1].when, due[-1].arrival)
             elif not self._strict and self._newest is not None and until - self._newest > WATCHDOG:
                 self.expired += self.torque != 0.0
                 changes = [(until, 0.0)] if self.torque != 0.0 else []
-                self._newest, self.torque = None, 0.0
+                self._newest, self.torque, self.stamp = None, 0.0, until
             return changes
 
     def age(self, now: int) -> float | None:
@@ -97,7 +100,10 @@ class CommandQueue:
     def shift(self, by: int) -> None:
         """Shift all instants by a number of ns, after their clock was re-anchored."""
         with self._lock:
-            self._waiting = [w._replace(when=w.when + by, arrival=w.arrival + by) for w in self._waiting]
+            waiting, self.stamp = self._waiting, self.stamp + by
+            self._waiting = [
+                PendingCommand(w.when + by, w.torque, w.arrival + by, w.stamp + by) for w in waiting
+            ]
             self._taken_until, self._from = self._taken_until + by, self._from + by
             self._newest = None if self._newest is None else self._newest + by
 

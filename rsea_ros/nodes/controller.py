@@ -33,6 +33,8 @@ WATCH = 0.005
 """s between two looks at the age of the last measurement."""
 
 CLOSING_ZEROS = 3
+FADE = 0.02
+"""Part by which a desired torque's lateness replaces the mean of those before."""
 
 
 class ControllerNode:
@@ -56,7 +58,7 @@ class ControllerNode:
         self._anchor, self._grid = Anchor(), Grid(self._period)
         self._limits = ControllerLimits(values)
         self._polarity = Polarity(load_rig(values["rig"]), values["rate"], values["torque_limit"])
-        self._last, self._heard, self._watched, self._until, self._torque = 0, 0, 0, 0, 0.0
+        self._last, self._heard, self._watched, self._lag, self._torque = 0, 0, 0, 0.0, 0.0
         self._fault, self._told_fault, self._release = "", "", (0, 0.0)
         self._wished = self._held = False
         self._steps = self._missed = self._limited = self._late = self._late_reported = self._restarts = 0
@@ -155,15 +157,15 @@ class ControllerNode:
     def _take_desired(self) -> float:
         """Take the desired torque nearest to this sample; return by how many samples it is for later.
 
-        One that came too late for its own sample, and one that still holds, are taken for one of this sample.
+        Senders whose desired torques always come too late for their own sample mean a later one.
         """
         place = self._grid.at + (round(2.0 * self._period) if self._values["preview"] else 0)
-        before, self._until = self._until, round(place + 0.5 * self._period)
-        taken = self._desired.take(self._until)
+        taken = self._desired.take(round(place + 0.5 * self._period))
         self._wished = self._wished or bool(taken)
-        if not taken or taken[-1][0] <= before:
-            return 0.0
-        return float(max((taken[-1][0] - place) / self._period, -0.5))
+        off = float((self._desired.stamp - place) / self._period)
+        if taken:
+            self._lag += FADE * (min(off + 0.5, 0.0) - self._lag)
+        return off - self._lag
 
     def _latch(self, fault: str) -> None:
         self._fault, self._release = fault, (time.monotonic_ns(), self._torque)
