@@ -86,8 +86,8 @@ def is_acceptable(model: Scored, current: Scored, settings: DiagnosisSettings = 
 def refusal(model: Scored, current: Scored, settings: DiagnosisSettings = DEFAULT) -> Reason | None:
     """Return why a model may not take the place of the current one; None where it may.
 
-    An effect at a bound imitates another one. A pair, a replacement, and one more cause
-    beside several that leave much are in doubt: they must take away more, and from the worst channel.
+    An effect at a bound imitates another one. A pair, and one more cause beside several that leave much,
+    are in doubt: they must take away more, and from the worst channel.
     """
     rule = settings.acceptance
     if model.is_at_bound:

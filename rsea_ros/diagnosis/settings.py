@@ -60,7 +60,7 @@ class AcceptanceSettings:
         f"{flat('0.03', '0.3')}; several small causes overlap on a real machine",
     )  # fmt: skip
     fall_in_doubt: float = number(
-        0.3, "1", "fall of the worst channel for a pair, a replacement, or a third cause that leaves much",
+        0.3, "1", "fall of the worst channel for a pair, or a third cause that leaves much",
         f"{flat('0.1', '0.5')}; these fit whatever is left, so they must bring six times as much",
     )  # fmt: skip
     causes_in_doubt: int = number(2, "1", "causes from which one more counts as doubtful while far")
@@ -114,7 +114,6 @@ class ForwardSettings:
     causes_beside_a_pair: int = number(
         1, "1", "causes beside which pairs are tried", "beside more of them, a pair fits whatever is left"
     )
-    replacements: int = number(2, "1", "steps that may replace a cause, beside those that add one")
 
 
 @dataclass(frozen=True)

@@ -1,15 +1,10 @@
 """Stepwise selection: from the re-fitted nominal model, cause after cause, until no effect helps any more.
 
 All are screened and the promising fitted on short pieces of the data; the best of those are fitted to all
-training blocks. Where none is acceptable, effects that the pieces overlooked are tried, then effects on the
-measured rotor angle, then two at once. Two at once are also tried where the best fits only far from the rig.
+training blocks. Where none is acceptable, effects on the measured rotor angle are tried, then two at once.
+Two at once are also tried where the best fits only far from the rig.
 
 Models are fitted to the training blocks and chosen on the validation blocks; the test blocks are not touched.
-
-Where no effect helps any more, a cause's place is offered to the more detailed effects that it may be
-confused with. The first causes were chosen while the others still hid in the residual: a hardening
-spring stands in for a stop, Coulomb friction for Stribeck's. Beside the causes that came later the right one
-fits better.
 """
 
 import math
@@ -29,7 +24,6 @@ from rsea_ros.diagnosis.candidate import (
     refit,
     rescore,
     with_noise_reestimated,
-    without_effect,
 )
 from rsea_ros.diagnosis.criteria import break_tie, is_acceptable, is_far_from_floor, loss_excess, refusal
 from rsea_ros.diagnosis.evaluation import Selection, Trial, trial_of
@@ -53,9 +47,6 @@ class StepResult(NamedTuple):
     trials: list[Trial]
 
 
-NO_STEP = StepResult(None, [])
-
-
 @dataclass(frozen=True)
 class ForwardStep:
     """The input of a step: the current model, the effects to try, and the number of earlier steps."""
@@ -73,10 +64,6 @@ class ForwardStep:
         close = self._fit_to_pieces(screened)
         finalists = self._finalists(screened, close)
         models = self.fits.fit_all(finalists)
-        if not self._acceptable(models):
-            overlooked = self.fits.find_overlooked(_others(screened, finalists))
-            finalists += overlooked
-            models += self.fits.fit_all(overlooked)
         if self.fits.is_far and all(
             is_far_from_floor(m, self.settings) for m in self._acceptable(models)
         ):
@@ -212,39 +199,18 @@ def select_stepwise(
     setup = FitSetup(nominal.cases, settings, pools.run)
     models = [_fit_nominal(nominal, setup, start)]
     trials: list[Trial] = []
-    for number in range(settings.max_causes + settings.forward.replacements):
+    for number in range(settings.max_causes):
         current = models[-1]
         if _is_finished(current):
             break
-        forward = ForwardStep(current, effects, number, pools, tell, settings)
-        step = forward.run() if len(current.causes) < settings.max_causes else NO_STEP
+        step = ForwardStep(current, effects, number, pools, tell, settings).run()
         trials += step.trials
-        if step.accepted is None:
-            step = replacement_step(forward)
         if step.accepted is None:
             break
         trials.append(trial_of(step.accepted, step.accepted.newest, current, "replaced"))
         models.append(on_fine_steps(refit(with_noise_reestimated(step.accepted), setup), setup))
     cases = models[-1].cases
     return Selection((*(rescore(m, cases) for m in models[:-1]), models[-1]), tuple(trials))
-
-
-def replacement_step(step: ForwardStep) -> StepResult:
-    """Return the step to a model with another effect in the place of one cause, where it is acceptable."""
-    current, settings = step.current, step.settings
-    for name in current.causes if is_far_from_floor(current, settings) else ():
-        alike = [e for e in look_alikes(name, step.effects) if e.name not in current.problem.acting]
-        rivals = [e for e in alike if effect_size(e.name) > effect_size(name)]
-        if not rivals:
-            continue
-        setup = FitSetup(
-            current.cases, settings, step.pools.run, weights=current.validation, is_quick=True
-        )
-        rest = fit_candidate(setup, *without_effect(current.problem, current.solution.theta, name))
-        result = replace(step, current=rest, effects=rivals).run()
-        if result.accepted is not None and is_acceptable(result.accepted, current, settings):
-            return result
-    return NO_STEP
 
 
 def _fit_nominal(nominal: Problem, setup: FitSetup, start: Rig | None) -> Candidate:

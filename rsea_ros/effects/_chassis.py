@@ -6,7 +6,8 @@ speeds at both ends. The chassis y, with the inertia j, the spring k and its dam
     j y'' + b y' + k y = C,   |d - y| <= half the gap,   C pushes only, at a flank
 
 rides on a flank as long as that pushes, moves freely and exactly otherwise, and takes the gear's speed when
-it meets a flank.
+it meets a flank. Play behind the chassis has a seat without inertia or memory: spring and damper act beyond
+the gap and only push, as most simulators have it.
 """
 
 import math
@@ -121,3 +122,37 @@ def over_step(y_0, v_0, side, half, path, chassis):  # type: ignore[no-untyped-d
     area -= (j * (speed - v) + b * (end - y)) / k
     _, _, before = along(path, meets)
     return d_1 - side * half, w_1, side, area + whole - before - side * half * (h - meets)
+
+
+@njit(inline="always")
+def seat_torque(half, path, chassis):  # type: ignore[no-untyped-def]
+    """Return the torque of a spring with a seat, N m: the mean over the step, and at its end."""
+    d_0, _, d_1, _, h = path
+    k, b, _ = chassis
+    mean = at_end = 0.0
+    for side in (-1.0, 1.0):
+        e_0, e_1 = side * d_0 - half, side * d_1 - half
+        if e_0 <= 0.0 and e_1 <= 0.0:
+            continue
+        meets = h * e_0 / (e_0 - e_1)
+        for _ in range(3 if e_0 * e_1 < 0.0 else 0):
+            angle, speed, _ = along(path, meets)
+            meets = min(max(meets + (half - side * angle) / (side * speed + 1e-300), 0.0), h)
+        start, end = meets if e_0 < 0.0 else 0.0, meets if e_1 < 0.0 else h
+        angle_0, speed_0, area_0 = along(path, start)
+        angle_1, speed_1, area_1 = along(path, end)
+        push_0 = k * (side * angle_0 - half) + b * side * speed_0
+        push_1 = k * (side * angle_1 - half) + b * side * speed_1
+        if push_0 <= 0.0 and push_1 <= 0.0:
+            continue
+        if push_1 < 0.0:
+            end = start + (end - start) * push_0 / (push_0 - push_1)
+            angle_1, _, area_1 = along(path, end)
+        elif push_0 < 0.0:
+            start += (end - start) * push_0 / (push_0 - push_1)
+            angle_0, _, area_0 = along(path, start)
+        pushed = k * (area_1 - area_0 - side * half * (end - start)) + b * (angle_1 - angle_0)
+        mean += pushed / h
+        if e_1 > 0.0:
+            at_end += side * max(push_1, 0.0)
+    return mean, at_end

@@ -5,7 +5,8 @@
 y is the chassis, which has its own inertia, d the gear output, both against the distal side. The flanks
 only push: C >= 0 at the forward one. The impact is inelastic, see _chassis.py. With e = y - d the gear
 feels J e'' + b_s e' + K_s e beside the torque of the nominal spring, the F/T sensor all but the first.
-Where the play lies behind the chassis, that turns with the gear: on_gear = 1, and the spring's seat is light.
+Where the play lies behind the chassis, that turns with the gear: on_gear = 1, and the spring's seat is light:
+T_s = K_s · e + b_s · ė beyond the gap, with e the gear's angle there, as long as that pushes.
 The error of a step is corrected in the next one, so an unforeseen impact at its end loses no momentum.
 With the housing free, 4 mrad, 30 N·m of noise or chirp at 280 Hz, the torque is within 0.1 to 0.7 % RMS of
 an event-driven model in 28 of 30 records (1 mrad: 0.2 %), but for samples within 0.1 ms of an impact, where
@@ -16,7 +17,7 @@ Source: Nordin, Gutman, Automatica 38, 2002, section 2 (exact model of a shaft w
 from collections.abc import Sequence
 
 from rsea_ros.effects import signal_table as st
-from rsea_ros.effects._chassis import GearPath, SprungChassis, along, over_step
+from rsea_ros.effects._chassis import GearPath, SprungChassis, along, over_step, seat_torque
 from rsea_ros.effects.effect import Claims, Effect, Gap, Parameter, compiled
 from rsea_ros.effects.guess import STIFFNESS, Guess, ResidualView
 
@@ -32,7 +33,7 @@ def apply(s, p, x):  # type: ignore[no-untyped-def]
     if half == 0.0 or k == 0.0:
         return
     least = FASTEST * k * h * h
-    j = p[1] * least + (1.0 - p[1]) * max(s[st.J_SC], least)
+    j, seated = max(s[st.J_SC], least), p[1]
     d, w = s[st.DEFLECTION] + 0.5 * s[st.DEFLECTION_SPAN], s[st.DEFLECTION_RATE]
     if x[STARTED] == 0.0:
         x[D], x[W], x[STARTED] = s[st.DEFLECTION] - 0.5 * s[st.DEFLECTION_SPAN], w, 1.0
@@ -42,8 +43,10 @@ def apply(s, p, x):  # type: ignore[no-untyped-def]
     path, chassis = GearPath(x[D], x[W], d, w, h), SprungChassis(k, b, j)
     y, v, side, area = over_step(x[Y], x[V], x[SIDE], half, path, chassis)
     _, _, whole = along(path, h)
-    spring = (k * (area - whole) + b * ((y - x[Y]) - (d - x[D]))) / h
-    inertia = j * ((v - x[V]) - (w - x[W])) / h + x[OWED]
+    seat, seat_at_end = seat_torque(half, path, chassis)
+    nominal = (k * whole + b * (d - x[D])) / h
+    spring = (1.0 - seated) * (k * area + b * (y - x[Y])) / h + seated * seat - nominal
+    inertia = (1.0 - seated) * j * ((v - x[V]) - (w - x[W])) / h + x[OWED]
     if s[st.COMMIT] == 0.0:
         x[GIVEN] = spring + inertia
         s[st.SPRING_TORQUE] += spring + inertia
@@ -51,8 +54,9 @@ def apply(s, p, x):  # type: ignore[no-untyped-def]
     else:
         x[OWED] = spring + inertia - x[GIVEN]
         x[Y], x[V], x[SIDE], x[D], x[W] = y, v, side, d, w
-        s[st.SPRING_TORQUE] += k * (y - d) + b * (v - w)
-        s[st.PLAY] = y - d
+        at_end = (1.0 - seated) * (k * y + b * v) + seated * seat_at_end
+        s[st.SPRING_TORQUE] += at_end - k * d - b * w
+        s[st.PLAY] = (1.0 - seated) * (y - d) - seated * min(max(d, -half), half)
 
 
 _SHARES = (0.1, 0.3, 0.6)

@@ -38,6 +38,7 @@ from rsea_ros.identification.solver import Map, Pools, Solution, serial, solve
 from rsea_ros.identification.start import scale_of
 from rsea_ros.identification.unknowns import (
     Unknown,
+    apply,
     clocks,
     idle,
     start_vector,
@@ -87,10 +88,15 @@ def fit(
 
     The noise is the one that the first fit's residual shows. Where a channel's residual stays above it the
     weight becomes that residual, as in maximum likelihood with unknown noise. start: a start,
-    if the records fit it better than `rig`.
+    if the records fit it better than `rig`. The forms of a law are free once the rest fits.
     """
     unknowns = tuple(u for u in unknowns_of(rig, cases) if not u.is_clock)
     problem = Problem(tuple(cases), rig, unknowns, MEASURED)
+    laws = [effect_named(e.name) for e in rig.effects]
+    if forms := {f"{law.name}.{p.name}" for law in laws for p in law.parameters if p.optional}:
+        rest = replace(problem, unknowns=tuple(u for u in unknowns if u.name not in forms))
+        first = solve(rest, _better_start(rest, start, run), run=run)
+        start = apply(rig, rest.unknowns, first.theta)[0]
     solution = solve(problem, _better_start(problem, start, run), run=run)
     outputs = problem.outputs(solution.theta)
     known = with_noise_of(problem, outputs)

@@ -1,4 +1,4 @@
-"""Stepwise selection as tables: the steps of a search, where it ends, the gain that a replacement needs."""
+"""Stepwise selection as tables: the steps of a search, and where it ends."""
 
 from __future__ import annotations
 
@@ -13,14 +13,12 @@ from scripted import POOLS, script, settings
 from rsea_ros.diagnosis import stepwise
 from rsea_ros.diagnosis.evaluation import trial_of
 from rsea_ros.diagnosis.settings import DEFAULT
-from rsea_ros.diagnosis.stepwise import NO_STEP, StepResult, replacement_step, select_stepwise
+from rsea_ros.diagnosis.stepwise import StepResult, select_stepwise
 from rsea_ros.effects.catalogue import effect_named
 
-FRICTION, STRIBECK, LUGRE, HYSTERESIS = (
-    "coulomb_friction", "stribeck_friction", "lugre_friction", "spring_hysteresis"
-)  # fmt: skip
-GAP, STOP, DELAY, LAG = "backlash", "hard_stop", "command_delay", "current_loop_lag"
-OTHERS = [effect_named(n) for n in (FRICTION, STRIBECK, LUGRE, GAP, STOP, DELAY)]
+FRICTION, HYSTERESIS = "coulomb_friction", "spring_hysteresis"
+GAP, DELAY, LAG = "backlash", "command_delay", "current_loop_lag"
+OTHERS = [effect_named(n) for n in (FRICTION, GAP, DELAY)]
 
 
 @dataclass(frozen=True)
@@ -128,22 +126,6 @@ def test_no_more_causes_are_accepted_than_max_causes(world, most):
     assert len(search.runs) == most, "no more is tried than may be accepted"
 
 
-@pytest.mark.parametrize(("replacements", "last"), [(0, (FRICTION,)), (1, (STRIBECK,)), (2, (LUGRE,))])
-def test_no_more_replacements_are_made_than_allowed(world, monkeypatch, replacements, last):
-    search = world(
-        script({"": 90.0, FRICTION: 60.0, STRIBECK: 30.0, LUGRE: 10.0, LAG: 50.0}), {(): (FRICTION,)}
-    )
-    following = {(FRICTION,): (STRIBECK,), (STRIBECK,): (LUGRE,), (LUGRE,): (FRICTION,)}
-
-    def replace_step(step):
-        name = following[step.current.causes]
-        return StepResult(search.fits.candidate(*name), [])
-
-    monkeypatch.setattr(stepwise, "replacement_step", replace_step)
-    selection = search.select(settings(max_causes=1, replacements=replacements))
-    assert selection.last.causes == last
-
-
 def test_trials_are_kept(world):
     selection = world(script(BOTH), ALONG).select()
     assert [(t.name, t.beside.causes, t.reason) for t in selection.trials] == [
@@ -160,42 +142,3 @@ def test_every_model_is_fitted_again_in_its_noise_and_all_are_scored_in_that_of_
     each = [(what, c) for c in ((), (FRICTION,), (FRICTION, GAP)) for what in ("noise", "refit")]
     assert search.events == [*each, ("scored", ()), ("scored", (FRICTION,))]
     assert [m.outputs for m in selection.models] == [[{"scored": True}]] * 2 + [[{}]]
-
-
-def replacement(search, *current, effects=OTHERS):
-    """The causes of the model that a replacement leads to; None for none."""
-    step = Step(search.fits.candidate(*current), effects, 7, POOLS, None, DEFAULT)
-    result = replacement_step(step)
-    return None if result is NO_STEP else result.accepted.causes
-
-
-@pytest.mark.parametrize(
-    ("before", "after", "expected"),
-    [
-        (20.0, 13.5, (STRIBECK,)),  # 30 % less, as one in another's place must bring
-        (20.0, 14.5, None),
-        (5.0, 1.0, (STRIBECK,)),
-        (4.9, 1.0, None),  # near the floor nothing is replaced
-    ],
-)
-def test_a_more_detailed_effect_replaces_a_cause_where_it_gains_enough(world, before, after, expected):
-    search = world(script({"": 40.0, FRICTION: before, STRIBECK: after, LAG: 9.0}), {(): (STRIBECK,)})
-    assert replacement(search, FRICTION) == expected
-    tried = [(7, (), (STRIBECK, LUGRE))] if before >= 5.0 else []
-    assert search.runs == tried, "its look-alikes that say more than it does, and no others"
-    assert search.fits.log == [((), True)] * len(tried)
-    for setup, _ in search.fits.setups:
-        assert setup.weights.ratio("ft") == before and setup.cases == search.fits.cases
-
-
-@pytest.mark.parametrize("first", [None, (STRIBECK, GAP)])
-def test_the_next_place_is_tried_where_one_brings_nothing(world, first):
-    """Delay has no rival here; Stribeck friction in place of friction gains too little; a stop helps."""
-    ratios = {"": 99.0, f"{DELAY}+{FRICTION}+{GAP}": 20.0, f"{DELAY}+{FRICTION}": 50.0, LAG: 9.0}
-    ratios |= {f"{DELAY}+{GAP}": 50.0, f"{STRIBECK}+{GAP}": 19.0, f"{DELAY}+{FRICTION}+{STOP}": 9.0}
-    steps = {(DELAY, GAP): first, (DELAY, FRICTION): (DELAY, FRICTION, STOP)}
-    search = world(script(ratios), steps)
-    assert replacement(search, DELAY, FRICTION, GAP) == (DELAY, FRICTION, STOP)
-    assert [(current, names) for _, current, names in search.runs] == [
-        ((DELAY, GAP), (STRIBECK, LUGRE)), ((DELAY, FRICTION), (STOP,))
-    ]  # fmt: skip

@@ -125,6 +125,36 @@ def test_simulation_obeys_the_whole_equation(name: str, monkeypatch: pytest.Monk
         assert rms(simulated[signal] - true[signal]) < TOLERANCE[signal], signal
 
 
+def test_a_seat_behind_the_play_forgets_what_a_chassis_remembers():
+    """A damped spring at resonance: the gear crosses the gap in 0.5 ms, and a chassis returns in 2 ms."""
+    j, b, k, d, gap = 0.21, 1.9, 310.0, 0.55, 3e-3
+    rig = RIG.with_values({
+        "rotor.reflected_inertia": j - RIG["chassis.inertia"], "rotor.reflected_damping": b,
+        "spring.stiffness": k, "spring.damping": d,
+    })  # fmt: skip
+    t = np.arange(700) / 500.0
+    commanded = Channel(t, 10.0 * np.sin(2.0 * np.pi * 5.6 * t))
+
+    def rate(q, w, u):
+        side = math.copysign(1.0, q)
+        deep = side * q - gap / 2
+        push = max(k * deep + d * side * w, 0.0) if deep > 0.0 else 0.0
+        return (u - b * w - side * push) / j
+
+    q, w, h, true = 0.0, 0.0, 2e-3 / 50, []
+    for u in np.repeat(commanded.y, 50):  # the midpoint rule
+        q_half, w_half = q + 0.5 * h * w, w + 0.5 * h * rate(q, w, u)
+        q, w = q + h * w_half, w + h * rate(q_half, w_half, u)
+        true.append(q)
+    true = np.array(true[49::50])
+    seat, chassis = (
+        simulate(drive_from(record_of(commanded)), "backlash", {"gap": gap, "on_gear": on}, rig)["position"]
+        for on in (1.0, 0.0)
+    )
+    assert rms(seat - true) < 2e-4 * rms(true)
+    assert rms(chassis - true) > 4e-3 * rms(true)
+
+
 def pendulum_rig():
     """Return the bench with its spring's end free, a pendulum on it."""
     values = {"spring_end.inertia": MASS, "spring_end.damping": DAMPING, "spring_end.gravity": HEAVY}
