@@ -170,6 +170,11 @@ class ControllerLimits:
         state = State(stamp, r.position, r.velocity, r.motor_torque, stamp, wrench)
         return str((self._witnesses and self._witnesses.take(state, commanded)) or "")
 
+    @property
+    def contradiction(self) -> str:
+        """What contradicts ft for half a second, less gravely than for a fault, in words."""
+        return self._witnesses.words if self._witnesses else ""
+
     def fault(self, ft: float, desired: float) -> str:
         """Return the fault that must end the torque, in words; empty without one.
 

@@ -242,7 +242,7 @@ class ControllerNode:
             "desired_watchdog_trips": self._desired.expired,
             "refused_desired": self._desired.refused,
         }
-        warnings = [*self._loss_words()]
+        warnings = [*filter(None, [self._limits.contradiction]), *self._loss_words()]
         new, self._late_reported = self._late - self._late_reported, self._late
         if new:
             warnings.insert(0, f"{new} commands more than a sample late, with less feedback")

@@ -117,6 +117,25 @@ def test_a_controller_does_not_follow_an_ft_that_reads_half_to_twice_the_torque(
     assert bool(fault) == (gain == 0.5) and made < 16.0
 
 
+def test_a_controller_that_follows_an_ft_with_another_zero_says_so():
+    """Its feedback makes half as much torque again of it; the controller was "running", beside a sound driver."""
+    values = {p.name: p.default for p in _control.TABLE}
+    limits = _control.ControllerLimits(_control.with_limits(values))
+    controller = TorqueController(load_rig(RIG), RATE, Gains(0.2575, 0.003029, 1.195, 6.99, 42.9))
+    plant, torque, told = Plant(load_rig(RIG), RATE), 0.0, {}
+    for k in range(round(6.0 * RATE)):
+        sample, time = plant.step(torque), k / RATE
+        reading = Measurement(sample.ft, sample.velocity, sample.position, sample.motor_torque)
+        reading = replace(reading, ft=reading.ft - (5.8 if time > 2.0 else 0.0))
+        assert not limits.falsified(round(k * SECOND / RATE), reading, torque)
+        if time < 0.7:
+            controller.start(reading)
+            continue
+        torque, told[time] = controller.step(reading, 10.0), limits.contradiction
+    assert not any(words for time, words in told.items() if time < 2.0)
+    assert all("K times deflection" in words for time, words in told.items() if time > 5.5)
+
+
 @pytest.mark.parametrize("delay", [0.0, 0.04])
 def test_a_delay_of_ft_that_the_rig_states_is_no_contradiction(monkeypatch, tmp_path, delay):
     """Beyond 10 ms one that nobody states is."""
