@@ -70,6 +70,7 @@ def _was_dropped(result: Candidate | None, self: ReducedModels, model: Candidate
 
 FITS, FORWARD = "step_fits:StepFits", "stepwise:ForwardStep"
 BRANCHES: Mapping[str, Branch] = {
+    "overlooked by the pieces": Branch({f"{FITS}.find_overlooked": _nothing}),
     "ripple on the measured angle": Branch({f"{FITS}.on_measured_angle": _nothing}),
     "starts from stated values": Branch({f"{FITS}._from_stated_values": _nothing}),
     "pairs": Branch({f"{FORWARD}._pairs": _nothing}),

@@ -118,7 +118,7 @@ def test_a_controller_does_not_follow_an_ft_that_reads_half_to_twice_the_torque(
 
 
 def test_a_controller_that_follows_an_ft_with_another_zero_says_so():
-    """Its feedback makes half as much torque again of it; the controller was "running", beside a sound driver."""
+    """Its feedback makes half as much torque again of it; beside a sound driver it was "running"."""
     values = {p.name: p.default for p in _control.TABLE}
     limits = _control.ControllerLimits(_control.with_limits(values))
     controller = TorqueController(load_rig(RIG), RATE, Gains(0.2575, 0.003029, 1.195, 6.99, 42.9))
