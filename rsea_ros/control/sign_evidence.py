@@ -84,7 +84,7 @@ class SignEvidence:
         """Count power and ways from here on."""
         assert self._before is not None
         self._pulsing, self._restless = True, self.unrest
-        self._work, self.most, self.way, self._driven = np.zeros(5), 0.0, 0.0, 0.0
+        self._work, self.most, self.way, self._driven, self._strongest = np.zeros(5), 0.0, 0.0, 0.0, 0.0
         self._ft, self._from = self._fast, self._before.position
 
     def end_pulse(self) -> None:
@@ -112,7 +112,7 @@ class SignEvidence:
         if self._pulsing:
             taken = (ft - self._ft) * turn
             self._work += np.array([made * turn, abs(made * turn), taken, turn * turn, abs(turn)])
-            self.most = max(self.most, abs(ft - self._ft))
+            self.most, self._strongest = max(self.most, abs(ft - self._ft)), max(self._strongest, abs(made))
             self._driven += speed * self._h * (1 + missed)
             self.way = max(self.way, self._stiffness * abs(r.position - self._from))
         self._settle(ft, speed)
@@ -161,6 +161,9 @@ class SignEvidence:
         beyond = MOVED * self._pulse + 2.0 * SIGMAS * self._restless
         half = low > BOTH[1] and self.way > BOTH[0] * self.most + beyond
         double = 0.0 < high < 1.0 / BOTH[1] and self.most > BOTH[0] * self.way + beyond
+        felt, made = min(self.way, self.most), self._strongest
+        if self._clamped and felt > GAIN * made + beyond:
+            return f"ft and K times the gear's angle moved by {felt:.3g} N·m at a motor torque of {made:.3g}"
         if self._clamped and (half or double):
             spring = f"K times the gear's angle by {self.way:.3g} N·m"
             return f"ft moved by {self.most:.3g}, {spring}, and ft is {1.0 / ft:.2g} times the motor's torque"

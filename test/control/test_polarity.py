@@ -95,6 +95,13 @@ def test_a_torque_that_is_ten_times_off_is_a_fault(factors, command):
     assert "expected ft positive" in polarity.contradiction or "N·m at a command" in polarity.contradiction
 
 
+@pytest.mark.parametrize("times", [4.0, 10.0])
+def test_a_motor_that_makes_many_times_what_it_says_is_a_fault_in_the_pulses(times):
+    """A torque constant of a tenth: pulses proved its sign, and feedback with ten times its gain followed."""
+    polarity, _ = probe(RIG, {"motor_torque": 1.0 / times}, command=times)
+    assert "at a motor torque of" in polarity.contradiction and not polarity.proven
+
+
 @pytest.mark.parametrize("gain", [0.5, 2.0])
 def test_an_ft_that_reads_half_or_double_contradicts_angle_and_motor_in_the_pulses(gain):
     """Half of it made 43 N m for 5 in the first tenth of a second of feedback."""
