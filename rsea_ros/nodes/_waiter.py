@@ -13,7 +13,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Iterable, Sequence
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack
 from typing import Any
 
 from rclpy.executors import Executor
@@ -93,7 +93,8 @@ def anything_to_do(node: Node, executor: Executor, pulse: Pulse) -> bool:
     nobody; the executor sees to them when it runs next.
     """
     assert node.context.handle is not None
-    with ExitStack() as held:
+    held: list[Any] = []
+    try:
         subscriptions, timers, clients, services = (
             _hold(held, executor, entities)
             for entities in (node.subscriptions, node.timers, node.clients, node.services)
@@ -113,17 +114,23 @@ def anything_to_do(node: Node, executor: Executor, pulse: Pulse) -> bool:
         waits.wait(FOR_EVER)
         ready = waits.get_ready_entities
         return any(ready(kind) for kind in ("subscription", "timer", "client", "service"))
+    finally:
+        for handle in held:
+            handle.__exit__(None, None, None)
 
 
-def _hold(held: ExitStack, executor: Executor, entities: Iterable[Any]) -> list[Any]:
-    """Return the handles of entities that an executor may serve, kept alive while they are waited for.
+def _hold(held: list[Any], executor: Executor, entities: Iterable[Any]) -> list[Any]:
+    """Return the handles of entities that an executor may serve, entered, and add them to the held ones.
 
-    Another thread may have destroyed some since, as a session does with the subscriptions of its last run.
+    Another thread may have destroyed some since, as a session does with the subscriptions of its last run. An
+    ExitStack would take half of the time that a node spends on waiting.
     """
-    handles = []
+    first = len(held)
     for entity in entities:
-        if executor.can_execute(entity):
-            with suppress(rclpy_implementation.InvalidHandle):
-                held.enter_context(entity.handle)
-                handles.append(entity.handle)
-    return handles
+        try:
+            if executor.can_execute(entity):
+                (handle := entity.handle).__enter__()
+                held.append(handle)
+        except rclpy_implementation.InvalidHandle:
+            continue
+    return held[first:]
