@@ -5,6 +5,7 @@ Fixed step, deterministic. The same compiled step (step.py) serves the plant, on
 
 import itertools
 import math
+from bisect import bisect_left
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -357,7 +358,7 @@ def _calls(
     ports = [item[0] for item in items]
     p_sizes, x_sizes = [len(i[3]) for i in items], [i[4] for i in items]
     calls = Calls(
-        first=np.array([sum(p < port for p in ports) for port in range(len(st.Port) + 1)], dtype=np.int64),
+        first=np.array([bisect_left(ports, port) for port in range(len(st.Port) + 1)], dtype=np.int64),
         address=np.array([i[2].address for i in items], dtype=np.int64),
         p_at=np.cumsum([0, *p_sizes], dtype=np.int64),
         x_at=np.cumsum([0, *x_sizes], dtype=np.int64),
