@@ -7,7 +7,8 @@ import itertools
 import math
 from bisect import bisect_left
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -139,7 +140,7 @@ class Machine:
     mechanics: Mechanics
     lags: bool
     early: float
-    start_maps: dict[str, FloatArray] = field(default_factory=dict)
+    start_maps: dict[str, FloatArray]
 
     def begin(self, initial: tuple[float, float] = (0.0, 0.0), spring: SpringStart | None = None) -> None:
         """Set the state to an output angle (rad) and velocity (rad/s), at time zero, with no history.
@@ -311,9 +312,8 @@ def build(rig: Rig, step: float, duration: float, *, in_loop: bool = False) -> M
     rig = with_structure(rig)
     active = [(e, p) for e, p in settings if e.port != st.Port.STRUCTURE]
     _check_sensor(rig, active)
-    falling = mechanics(rig, linear_gravity=False)
-    linear = propagator(rig, step, {r for e, _ in active for r in e.reads}, falling)
-    hanging = mechanics(rig) if any(rig[f"{end}.gravity"] for end in END_NAMES) else falling
+    reads = frozenset(r for e, _ in active for r in e.reads)
+    linear, hanging, start_maps = _linear_part(_Body(rig, step, reads))
     calls, states = _calls(rig, active, in_loop)
     table = np.zeros(st.SIZE)
     table[[st.STEP, st.DURATION, st.COMMIT]] = step, duration, 1.0
@@ -324,8 +324,32 @@ def build(rig: Rig, step: float, duration: float, *, in_loop: bool = False) -> M
     tags = {tag for effect, values in active if any(values.values()) for tag in effect.tags}
     return Machine(
         linear, calls, np.zeros(len(linear.phi)), table, np.zeros(states), hanging,
-        lags="lag" in tags, early=ON_GRID if "delay" in tags else 0.5,
+        "lag" in tags, ON_GRID if "delay" in tags else 0.5, start_maps,
     )  # fmt: skip
+
+
+class _Body:
+    """A rig and a step, s: equal where the linear part is. A fit moves an effect's values alone, too."""
+
+    def __init__(self, rig: Rig, step: float, reads: frozenset[int]) -> None:
+        self.rig, self.step, self.reads = rig, step, reads
+        ends = rig.clamped, rig.proximal, rig.ft_end, rig.encoder_end
+        self._key = (*rig.values().items(), step, reads, *ends, rig.train, rig.rigid_spring, rig.linear)
+
+    def __hash__(self) -> int:
+        return hash(self._key)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Body) and self._key == other._key
+
+
+@lru_cache(maxsize=16)
+def _linear_part(body: _Body) -> tuple[Linear, Mechanics, dict[str, FloatArray]]:
+    """Return the propagators, the equations of motion with gravity, and the start maps known so far."""
+    rig = body.rig
+    falling = mechanics(rig, linear_gravity=False)
+    linear = propagator(rig, body.step, body.reads, falling)
+    return linear, mechanics(rig) if any(rig[f"{end}.gravity"] for end in END_NAMES) else falling, {}
 
 
 def _check_sensor(rig: Rig, active: Sequence[tuple[Effect, Mapping[str, float]]]) -> None:
