@@ -7,7 +7,7 @@ import itertools
 import math
 from bisect import bisect_left
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any
 
@@ -313,7 +313,9 @@ def build(rig: Rig, step: float, duration: float, *, in_loop: bool = False) -> M
     active = [(e, p) for e, p in settings if e.port != st.Port.STRUCTURE]
     _check_sensor(rig, active)
     reads = frozenset(r for e, _ in active for r in e.reads)
-    linear, hanging, start_maps = _linear_part(_Body(rig, step, reads))
+    ends = rig.clamped, rig.proximal, rig.ft_end, rig.encoder_end
+    body = _Body(rig, (*rig.values().items(), *ends, rig.train, rig.rigid_spring, rig.linear))
+    linear, hanging, start_maps = _linear_part(body, step, reads)
     calls, states = _calls(rig, active, in_loop)
     table = np.zeros(st.SIZE)
     table[[st.STEP, st.DURATION, st.COMMIT]] = step, duration, 1.0
@@ -328,27 +330,22 @@ def build(rig: Rig, step: float, duration: float, *, in_loop: bool = False) -> M
     )  # fmt: skip
 
 
+@dataclass(frozen=True)
 class _Body:
-    """A rig and a step, s: equal where the linear part is. A fit moves an effect's values alone, too."""
+    """A rig, equal where all that its linear part depends on is: a fit moves an effect's values, too."""
 
-    def __init__(self, rig: Rig, step: float, reads: frozenset[int]) -> None:
-        self.rig, self.step, self.reads = rig, step, reads
-        ends = rig.clamped, rig.proximal, rig.ft_end, rig.encoder_end
-        self._key = (*rig.values().items(), step, reads, *ends, rig.train, rig.rigid_spring, rig.linear)
-
-    def __hash__(self) -> int:
-        return hash(self._key)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Body) and self._key == other._key
+    rig: Rig = field(compare=False)
+    states: tuple[object, ...]
 
 
 @lru_cache(maxsize=16)
-def _linear_part(body: _Body) -> tuple[Linear, Mechanics, dict[str, FloatArray]]:
+def _linear_part(
+    body: _Body, step: float, reads: frozenset[int]
+) -> tuple[Linear, Mechanics, dict[str, FloatArray]]:
     """Return the propagators, the equations of motion with gravity, and the start maps known so far."""
     rig = body.rig
     falling = mechanics(rig, linear_gravity=False)
-    linear = propagator(rig, body.step, body.reads, falling)
+    linear = propagator(rig, step, reads, falling)
     return linear, mechanics(rig) if any(rig[f"{end}.gravity"] for end in END_NAMES) else falling, {}
 
 
