@@ -28,9 +28,10 @@ from rsea_ros.identification.solver import on_cores
 
 gc.disable()  # until all is collected: it finds nothing in what tests are made of, in a second of each worker
 
-BYTECODE = sys.dont_write_bytecode, sys.pycache_prefix
-if sys.dont_write_bytecode:  # then pytest would rewrite 3000 asserts anew in each worker, 10 s each
+if sys.dont_write_bytecode:  # pytest would rewrite 3000 asserts in each worker, 10 s, and programs compile
     sys.dont_write_bytecode, sys.pycache_prefix = False, str(trusted_cache("bytecode"))
+    os.environ["PYTHONPYCACHEPREFIX"] = sys.pycache_prefix
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 hypothesis.settings.register_profile("rsea", deadline=None, derandomize=True, database=None)
 hypothesis.settings.load_profile("rsea")
@@ -72,8 +73,9 @@ WAITING = (
 """Files that clocks of nodes and wires judge: the first worker alone takes them, one after the other."""
 
 PATIENT = (
-    "cli/test_run_launch_topics", "nodes/test_identify_diagnosis", "nodes/test_parameters", "watch/test_page",
-    "watch/test_server", "cli/test_bench", "cli/test_ctrl_c", "msg_adapters/test_ros",
+    "cli/test_run_launch_topics", "nodes/test_identify_diagnosis", "nodes/test_parameters",
+    "nodes/test_policies", "nodes/test_realtime", "watch/test_page", "watch/test_server", "cli/test_bench",
+    "cli/test_ctrl_c", "msg_adapters/test_ros",
 )  # fmt: skip
 """Files that wait for processes and are late for nothing: any worker takes them, at the end."""
 
@@ -161,10 +163,9 @@ def pytest_runtest_makereport(item: pytest.Item, call: pytest.CallInfo[None]) ->
 
 
 def pytest_collection_finish() -> None:
-    """Leave the bytecode of what the tests import to the environment again, and what now exists in memory.
+    """Leave what now exists in memory.
 
     Else the collector of garbage looks through all modules and items again and again, 4 % of the time.
     """
     gc.freeze()
     gc.enable()
-    sys.dont_write_bytecode, sys.pycache_prefix = BYTECODE

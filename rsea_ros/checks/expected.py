@@ -76,19 +76,17 @@ def quotient(channel: str, t: FloatArray, y: FloatArray, p: FloatArray) -> Quoti
     """Return the quotient of measured y and predicted p at stamps t (s), None for too few samples."""
     if len(t) < 64 or not np.isfinite(p).all():
         return None
-    period = float(np.median(np.diff(t)))
-    even = np.arange(t[0], t[-1], period)
-    y, p = (np.interp(even, t, v) for v in (y, p))
+    clock, period = even(t)
+    y, p = (np.interp(clock, t, v) for v in (y, p))
     measured, predicted = float(np.std(y)), float(np.std(p))
-    if len(even) < _FEWEST * _SEGMENTS or not (predicted > 0.0 and measured > 0.0):
+    if len(clock) < _FEWEST * _SEGMENTS or not (predicted > 0.0 and measured > 0.0):
         return None
-    longest = next_fast_length(max(_FEWEST, int(_LONGEST / period)))
-    length = min(len(even) // _SEGMENTS, longest)
+    length = _length(len(clock), period)
     pp = _segments(p, length)
-    if (captured := _captured_share(pp, p)) < _ENOUGH:  # slow: its lines lie below those of short segments
-        length = len(even) // _SEGMENTS
+    if (captured := float(_captured_share(pp, p))) < _ENOUGH:  # slow: short segments have no line for it
+        length = len(clock) // _SEGMENTS
         pp = _segments(p, length)
-        captured = _captured_share(pp, p)
+        captured = float(_captured_share(pp, p))
     yy = _segments(y, length)
     cross = np.sum(yy * pp.conj(), axis=0)
     power_y, power_p = (np.sum(np.abs(v) ** 2, axis=0) + _TINY for v in (yy, pp))
@@ -111,11 +109,44 @@ def quotient(channel: str, t: FloatArray, y: FloatArray, p: FloatArray) -> Quoti
     )
 
 
-def _captured_share(spectra: ComplexArray, values: FloatArray) -> float:
-    """Return the share of a signal's power that its segments' lines hold."""
-    length = 2.0 * spectra.shape[1]
-    power = 2.0 * float(np.mean(np.sum(np.abs(spectra) ** 2, axis=1))) / (0.375 * length**2)
-    return float(power / np.var(values))
+def even(t: FloatArray) -> tuple[FloatArray, float]:
+    """Return stamps a median period of t apart, and this, s."""
+    steps = np.sort(np.diff(t))  # numpy's median takes 20 us more
+    period = float(0.5 * (steps[(len(steps) - 1) // 2] + steps[len(steps) // 2]))
+    return np.arange(t[0], t[-1], period), period
+
+
+def related(y: FloatArray, p: FloatArray, period: float) -> FloatArray:
+    """Return `related` of the quotients of each row of y and p, samples a period (s) apart; -1 where is none.
+
+    y, p: shape (k, n), or (1, n) of a channel that is the same in all.
+    """
+    n = y.shape[1]
+    if n < _FEWEST * _SEGMENTS:
+        return np.full(max(len(y), len(p)), -1.0)
+    length = _length(n, period)
+    pp = _segments(p, length)
+    found = _related(_segments(y, length), pp)
+    if (slow := _captured_share(pp, p) < _ENOUGH).any():
+        found = np.where(slow, _related(*(_segments(v, n // _SEGMENTS) for v in (y, p))), found)
+    return np.where((np.ptp(y, axis=1) > 0.0) & (np.ptp(p, axis=1) > 0.0), found, -1.0)
+
+
+def _related(yy: ComplexArray, pp: ComplexArray) -> FloatArray:
+    cross = np.abs(np.sum(yy * pp.conj(), axis=1)) ** 2
+    power_y, power_p = (np.sum(np.abs(v) ** 2, axis=1) + _TINY for v in (yy, pp))
+    return np.asarray(np.sum(cross / power_y, axis=1) / power_p.sum(axis=1))
+
+
+def _length(samples: int, period: float) -> int:
+    """Return the samples of a segment, at a period in s."""
+    return min(samples // _SEGMENTS, next_fast_length(max(_FEWEST, int(_LONGEST / period))))
+
+
+def _captured_share(spectra: ComplexArray, values: FloatArray) -> FloatArray:
+    """Return the share of a signal's power that its segments' lines hold, shape (...) for values (..., n)."""
+    power = 2.0 * np.mean(np.sum(np.abs(spectra) ** 2, axis=-1), axis=-1)
+    return np.asarray(power / (0.375 * (2.0 * spectra.shape[-1]) ** 2) / np.var(values, axis=-1))
 
 
 def usable(q: Quotient) -> BoolArray:
@@ -125,9 +156,9 @@ def usable(q: Quotient) -> BoolArray:
 
 
 def _segments(values: FloatArray, length: int) -> ComplexArray:
-    """Return the spectra of half-overlapping Hann segments from the second line on, shape (k, lines)."""
+    """Return the spectra of half-overlapping Hann segments from the second line on, (..., k, lines)."""
     spectra = segment_spectra(values, length)
-    return spectra[:, _FIRST : int(0.9 * spectra.shape[1])]
+    return spectra[..., _FIRST : int(0.9 * spectra.shape[-1])]
 
 
 @lru_cache(maxsize=64)

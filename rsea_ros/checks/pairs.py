@@ -24,11 +24,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rsea_ros.checks.expected import Quotient, quotient, usable
+from rsea_ros.checks.expected import Quotient, even, quotient, related, usable
 from rsea_ros.errors import RseaError
 from rsea_ros.model.equations import Mechanics, gear_inertia, mechanics
 from rsea_ros.model.rig import Rig
-from rsea_ros.records.record import Channel, FloatArray, Record
+from rsea_ros.records.record import Channel, ComplexArray, FloatArray, Record
 from rsea_ros.records.statistics import running_integral
 
 REACH = 2.0
@@ -327,10 +327,8 @@ def _measure(both: Signals, law: Law, start: float, stop: float) -> Pair:
     slow = max(1.0 / _SLOW, fast)
     q, late = _response(y, x, law, (start, stop), fast, 0.0), 0.0
     if q is None or q.related < _RELATED:
-        tried = np.arange(-REACH, REACH + 0.5 * NEAR, NEAR)
-        scanned = [(_response(slow_y, slow_x, law, (start, stop), slow, float(v)), float(v)) for v in tried]
-        known = [(r, v) for r, v in scanned if r is not None]
-        best, late = max(known, key=lambda both: both[0].related, default=(None, 0.0))
+        late = _most_related(slow_y, slow_x, law, (start, stop), slow)
+        best = _response(slow_y, slow_x, law, (start, stop), slow, late)
         q = _response(y, x, law, (start, stop), fast, late)
         q = best if best is not None and (q is None or q.related < _RELATED) else q
     if q is None:
@@ -342,12 +340,32 @@ def _measure(both: Signals, law: Law, start: float, stop: float) -> Pair:
     return pair if pair.fits or law.powers[-1] == 2 else _correlated(y, x, pair)
 
 
+def _most_related(y: Channel, x: Channel, law: Law, span: tuple[float, float], period: float) -> float:
+    """Return the lag within REACH, s, at which the two have most in common: lags of one span at one go."""
+    tried = np.arange(-REACH, REACH + 0.5 * NEAR, NEAR)
+    found, spans = np.full(len(tried), -1.0), np.array([_overlap(y, x, span, float(v)) for v in tried])
+    for low, high in {*map(tuple, spans[spans[:, 1] > spans[:, 0]])}:
+        rows = np.flatnonzero((spans == (low, high)).all(axis=1))
+        if len(t := np.arange(low, high, period)) < 2:
+            continue
+        t, _ = even(t)
+        a, b = _averaged(y, t[None], period), _averaged(x, t - tried[rows, None], period)
+        found[rows] = related(*((b, a) if law.inverted else (a, b)), period)
+    return float(tried[np.argmax(found)]) if found.max() >= 0.0 else 0.0
+
+
+def _overlap(y: Channel, x: Channel, span: tuple[float, float], late: float) -> tuple[float, float]:
+    """Return from when to when, s, both cover a span with x later by `late`; (0, 0) for too little of it."""
+    low, high = max(span[0], x.t[0] + late, y.t[0]), min(span[1], x.t[-1] + late, y.t[-1])
+    return (low, high) if high - low > _ENOUGH * (span[1] - span[0]) else (0.0, 0.0)
+
+
 def _response(
     y: Channel, x: Channel, law: Law, span: tuple[float, float], period: float, late: float
 ) -> Quotient | None:
     """Return the response over a span, s, of y to x, or of x to y, with y taken earlier by `late`, s."""
-    low, high = max(span[0], x.t[0] + late, y.t[0]), min(span[1], x.t[-1] + late, y.t[-1])
-    if not high - low > _ENOUGH * (span[1] - span[0]):
+    low, high = _overlap(y, x, span, late)
+    if not high > low:
         return None
     t = np.arange(low, high, period)
     a, b = _averaged(y, t, period), _averaged(x, t - late, period)
@@ -398,24 +416,23 @@ def _fit(q: Quotient, keep: np.ndarray, law: Law, late: float, pair: Pair) -> Pa
     doubt = np.hypot(q.sd[keep], _MODEL_ERROR)
     h = 1.0 / response if law.inverted else response
     span = min(REACH, 0.5 * math.pi * len(w) / float(w.max() - w.min() + 1e-9) + _AROUND)
-    lag = np.arange(-span, span, min(0.25 / float(w.max()), 0.01))
-    phase = w * lag[:, None]
-    turned = h * (np.cos(phase) + 1j * np.sin(phase))
-    rows = np.column_stack([(1j * w) ** p for p in law.powers]) / (np.abs(h) * doubt)[:, None]
+    step = min(0.25 / float(w.max()), 0.01)
+    lag, weight = np.arange(-span, span, step), np.abs(h) * doubt
+    rows = np.column_stack([(1j * w) ** p for p in law.powers]) / weight[:, None]
     rows = np.vstack([rows.real, rows.imag])
-    right = turned / (np.abs(h) * doubt)
-    right = np.hstack([right.real, right.imag])
     size = np.maximum(np.linalg.norm(rows, axis=0), 1e-300)
     basis, triangle = np.linalg.qr(rows / size)
-    cost = np.sum(right**2, axis=1) - np.sum((right @ basis) ** 2, axis=1)
+    explained = _turned_onto(h / weight * (basis[: len(w)] - 1j * basis[len(w) :]).T, w, lag, step)
+    cost = np.sum(doubt**-2) - np.sum(explained**2, axis=0)
     k = int(np.argmin(cost))
     apart = np.abs(lag - lag[k]) > _AROUND
     scale = max(1.0, float(cost[k]) / max(2 * len(w) - len(law.powers) - 1, 1))
     clear = not apart.any() or float(cost[apart].min() - cost[k]) > _RIVAL * scale
     inverse = np.linalg.pinv(triangle)
-    c = (inverse @ (basis.T @ right[k])) / size
+    c = (inverse @ explained[:, k]) / size
     sd = np.linalg.norm(inverse, axis=1) / size * math.sqrt(scale)
-    left = np.abs(turned[k] - sum(v * (1j * w) ** p for v, p in zip(c, law.powers, strict=True)))
+    turned = h * np.exp(1j * w * lag[k])
+    left = np.abs(turned - sum(v * (1j * w) ** p for v, p in zip(c, law.powers, strict=True)))
     share = float(np.median(left / np.abs(h)))
     fits = share < _FITS and q.related > _RELATED
     relative = sd / np.maximum(np.abs(c), 1e-300)
@@ -427,3 +444,11 @@ def _fit(q: Quotient, keep: np.ndarray, law: Law, late: float, pair: Pair) -> Pa
         pair, factor=abs(factor), sign=int(np.sign(factor)) if sure else 0, lag=late + float(lag[k]),
         ratios=ratios, sds=tuple(relative.tolist()), left=share, fits=bool(fits), clear=bool(clear),
     )  # fmt: skip
+
+
+def _turned_onto(directions: ComplexArray, w: FloatArray, lag: FloatArray, step: float) -> FloatArray:
+    """Return Re sum_n directions_kn exp(i w_n lag), shape (k, lags), for lags (s) a step (s) apart."""
+    fine = math.isqrt(len(lag)) + 1
+    coarse, beside = (np.exp(1j * np.outer(v, w)) for v in (lag[::fine], step * np.arange(fine)))
+    found: FloatArray = ((directions[:, None] * coarse) @ beside.T).real
+    return found.reshape(len(directions), -1)[:, : len(lag)]

@@ -107,10 +107,13 @@ def rises_behind_gaps(overlay: Overlay) -> bool:
     return bool(np.mean(off[behind & known]) > _TIMES**2 * np.mean(off[known & ~behind]))
 
 
-def identify(records: Sequence[Record], rig: Rig, progress: Progress | None = None) -> Identification:
+def identify(
+    records: Sequence[Record], rig: Rig, progress: Progress | None = None, *, of_misfit: bool = True
+) -> Identification:
     """Return the parameters of the rig, effects that it lists included, with their confidence.
 
-    Raises IdentificationError when the records lack a channel that the rig needs.
+    of_misfit: whether laws that would explain a misfit are fitted, too, and widen the intervals. Raises
+    IdentificationError when the records lack a channel that the rig needs.
     """
     report = progress or (lambda step, share: None)
     report("reading", 0.0)
@@ -136,7 +139,7 @@ def identify(records: Sequence[Record], rig: Rig, progress: Progress | None = No
             misfits = _misfits(solution, cases)
         report("confidence", 0.8)
         outputs = solution.problem.outputs(solution.theta)
-        others = alternatives(solution, cases, pools) if misfits else ()
+        others = alternatives(solution, cases, pools) if misfits and of_misfit else ()
         doubt = confidence_of(solution, pools.run)
     confidence = with_even_clocks(doubt, solution, records, steady.records)
     result = _result(solution, outputs, records, cases, responses, others, confidence)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -79,17 +80,17 @@ class Unknown:
         """Return the prior's one sigma over the value that it is around; absolute where that is 0."""
         return self.doubt if self.logarithmic else self.doubt / (abs(self.start) or 1.0)
 
-    @property
+    @cached_property
     def is_clock(self) -> bool:
         """Whether it is the clock error of a sensor, or its rate."""
         return self.name.split(".")[0] in (CLOCK, CLOCK_RATE)
 
-    @property
+    @cached_property
     def is_rate(self) -> bool:
         """Whether it is the rate of a sensor's clock."""
         return self.name.startswith(CLOCK_RATE + ".")
 
-    @property
+    @cached_property
     def is_cyclic(self) -> bool:
         """Whether a whole turn more is the same value: an angle that only its sine enters by."""
         return self.name.endswith(".gravity_angle")
@@ -211,14 +212,13 @@ def clock_rates(channels: Iterable[str]) -> tuple[Unknown, ...]:
 
 def apply(rig: Rig, unknowns: Sequence[Unknown], theta: FloatArray) -> tuple[Rig, Clocks]:
     """Return the rig with the values of theta, effects included, and the clocks of its sensors."""
-    values = {u.name: u.outer(float(t)) for u, t in zip(unknowns, theta, strict=True)}
+    values = {u.name: u.outer(t) for u, t in zip(unknowns, theta.tolist(), strict=True)}
     of_rig = {n: v for n, v in values.items() if n in FIELDS}
     offset, rate = (
         {u.name.split(".")[1]: values[u.name] for u in unknowns if u.is_clock and u.is_rate == of_rate}
         for of_rate in (False, True)
     )
-    effects = tuple(_move(e, values) for e in rig.effects)
-    return rig.with_values(of_rig).with_effects(*effects), Clocks(offset, rate)
+    return rig.moved(of_rig, tuple(_move(e, values) for e in rig.effects)), Clocks(offset, rate)
 
 
 def _move(setting: EffectSetting, values: Mapping[str, float]) -> EffectSetting:

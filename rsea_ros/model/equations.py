@@ -105,7 +105,7 @@ def mechanics(rig: Rig, *, linear_gravity: bool = True) -> Mechanics:
         placement.T @ (inside + load) @ placement
         for inside, load in zip(actuator_matrices(rig), _load_matrices(rig, linear_gravity), strict=True)
     )
-    if np.linalg.eigvalsh(mass).min() <= 0.0:
+    if (mass[0, 0] if len(mass) == 1 else np.linalg.eigvalsh(mass).min()) <= 0.0:
         raise RigError(
             f"rig {rig.name}: the mass matrix is singular, expected an inertia on every part that can move"
         )

@@ -90,6 +90,8 @@ def unit_of(name: str) -> str:
 
 def check_value(name: str, value: float, where: str = "rig") -> None:
     """Raise RigError when a value is not a possible one for its field."""
+    if name in FIELDS and LEAST_SIZE <= value <= GREATEST_SIZE and value > FIELDS[name].low:
+        return  # as nearly always: a fit asks for every value of every simulation
     unit = unit_of(name)
     low, allowed = FIELDS[name].low, FIELDS[name].low_allowed
     infinite_ok = FIELDS[name].default == math.inf
@@ -120,6 +122,9 @@ class Quantity:
     spread: float = 0.0
     source: str = ""
     ci95: tuple[float, float] | None = None
+
+
+_UNSTATED = Quantity(0.0)
 
 
 @dataclass(frozen=True)
@@ -235,8 +240,15 @@ class Rig:
 
     def with_values(self, values: Mapping[str, float]) -> Rig:
         """Return the rig with some values replaced (SI, by name as in FIELDS); spread and source stay."""
-        changed = {n: replace(self.quantities.get(n, Quantity(v)), value=float(v)) for n, v in values.items()}
-        return replace(self, quantities={**self.quantities, **changed})
+        return self.moved(values, self.effects)
+
+    def moved(self, values: Mapping[str, float], effects: tuple[EffectSetting, ...]) -> Rig:
+        """Return the rig with some values replaced and exactly these effects: at once, for fits."""
+        quantities = dict(self.quantities)
+        for name, value in values.items():
+            q = quantities.get(name, _UNSTATED)
+            quantities[name] = Quantity(float(value), q.spread, q.source, q.ci95)
+        return replace(self, quantities=quantities, effects=effects)
 
     def with_effects(self, *effects: EffectSetting) -> Rig:
         """Return the rig with exactly these active effects."""

@@ -5,8 +5,10 @@ Fixed step, deterministic. The same compiled step (step.py) serves the plant, on
 
 import itertools
 import math
+from bisect import bisect_left
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -138,7 +140,7 @@ class Machine:
     mechanics: Mechanics
     lags: bool
     early: float
-    start_maps: dict[str, FloatArray] = field(default_factory=dict)
+    start_maps: dict[str, FloatArray]
 
     def begin(self, initial: tuple[float, float] = (0.0, 0.0), spring: SpringStart | None = None) -> None:
         """Set the state to an output angle (rad) and velocity (rad/s), at time zero, with no history.
@@ -310,9 +312,10 @@ def build(rig: Rig, step: float, duration: float, *, in_loop: bool = False) -> M
     rig = with_structure(rig)
     active = [(e, p) for e, p in settings if e.port != st.Port.STRUCTURE]
     _check_sensor(rig, active)
-    falling = mechanics(rig, linear_gravity=False)
-    linear = propagator(rig, step, {r for e, _ in active for r in e.reads}, falling)
-    hanging = mechanics(rig) if any(rig[f"{end}.gravity"] for end in END_NAMES) else falling
+    reads = frozenset(r for e, _ in active for r in e.reads)
+    ends = rig.clamped, rig.proximal, rig.ft_end, rig.encoder_end
+    body = _Body(rig, (*rig.values().items(), *ends, rig.train, rig.rigid_spring, rig.linear))
+    linear, hanging, start_maps = _linear_part(body, step, reads)
     calls, states = _calls(rig, active, in_loop)
     table = np.zeros(st.SIZE)
     table[[st.STEP, st.DURATION, st.COMMIT]] = step, duration, 1.0
@@ -323,8 +326,27 @@ def build(rig: Rig, step: float, duration: float, *, in_loop: bool = False) -> M
     tags = {tag for effect, values in active if any(values.values()) for tag in effect.tags}
     return Machine(
         linear, calls, np.zeros(len(linear.phi)), table, np.zeros(states), hanging,
-        lags="lag" in tags, early=ON_GRID if "delay" in tags else 0.5,
+        "lag" in tags, ON_GRID if "delay" in tags else 0.5, start_maps,
     )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class _Body:
+    """A rig, equal where all that its linear part depends on is: a fit moves an effect's values, too."""
+
+    rig: Rig = field(compare=False)
+    states: tuple[object, ...]
+
+
+@lru_cache(maxsize=16)
+def _linear_part(
+    body: _Body, step: float, reads: frozenset[int]
+) -> tuple[Linear, Mechanics, dict[str, FloatArray]]:
+    """Return the propagators, the equations of motion with gravity, and the start maps known so far."""
+    rig = body.rig
+    falling = mechanics(rig, linear_gravity=False)
+    linear = propagator(rig, step, reads, falling)
+    return linear, mechanics(rig) if any(rig[f"{end}.gravity"] for end in END_NAMES) else falling, {}
 
 
 def _check_sensor(rig: Rig, active: Sequence[tuple[Effect, Mapping[str, float]]]) -> None:
@@ -357,7 +379,7 @@ def _calls(
     ports = [item[0] for item in items]
     p_sizes, x_sizes = [len(i[3]) for i in items], [i[4] for i in items]
     calls = Calls(
-        first=np.array([sum(p < port for p in ports) for port in range(len(st.Port) + 1)], dtype=np.int64),
+        first=np.array([bisect_left(ports, port) for port in range(len(st.Port) + 1)], dtype=np.int64),
         address=np.array([i[2].address for i in items], dtype=np.int64),
         p_at=np.cumsum([0, *p_sizes], dtype=np.int64),
         x_at=np.cumsum([0, *x_sizes], dtype=np.int64),

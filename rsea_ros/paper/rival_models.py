@@ -62,7 +62,7 @@ def compare(
 
     Nothing is fitted to the held-out records: a second sensor tests what the first one identified.
     """
-    fitted = {name: identify([train], rig).rig for name, rig in rivals.items()}
+    fitted = {name: identify([train], rig, of_misfit=False).rig for name, rig in rivals.items()}
     return tuple(Rival(n, rig, tuple(test_on(rig, *held) for held in holdout)) for n, rig in fitted.items())
 
 

@@ -31,11 +31,15 @@ def running_integral(values: FloatArray, t: FloatArray) -> FloatArray:
 
 
 def segment_spectra(values: FloatArray, length: int) -> ComplexArray:
-    """Return the spectrum of each segment of `length` samples, shape (segments, length // 2 + 1)."""
+    """Return the spectrum of each segment of `length` samples, shape (..., segments, length // 2 + 1).
+
+    values: shape (..., n).
+    """
     values, hop = np.ascontiguousarray(values), length - length // 2
-    shape, (width,) = (1 + (len(values) - length) // hop, length), values.strides
-    parts: FloatArray = np.ndarray(shape, values.dtype, values, strides=(hop * width, width))
-    return np.asarray(np.fft.rfft((parts - parts.mean(axis=1, keepdims=True)) * hann(length), axis=1))
+    shape = (*values.shape[:-1], 1 + (values.shape[-1] - length) // hop, length)
+    strides = (*values.strides[:-1], hop * values.itemsize, values.itemsize)
+    parts: FloatArray = np.ndarray(shape, values.dtype, values, strides=strides)
+    return np.asarray(np.fft.rfft((parts - parts.mean(axis=-1, keepdims=True)) * hann(length), axis=-1))
 
 
 def power_density(values: FloatArray, rate: float, length: int) -> tuple[FloatArray, FloatArray]:

@@ -17,7 +17,8 @@ from rsea_ros.nodes import driver
 from test.nodes.stalls import every
 from test.nodes.warm import parent
 
-ROOT = Path(__file__).resolve().parents[2]
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parents[1]
 TIMEOUT = 60.0
 AGAIN = 15.0
 """s without an answer, which no service takes."""
@@ -25,7 +26,7 @@ AGAIN = 15.0
 
 
 class Process:
-    """A node of the package, started with parameters."""
+    """A node of the package, or of this folder, started with parameters."""
 
     def __init__(self, name, log, parameters, remaps):
         words = [w for key, value in parameters.items() for w in ("-p", f"{key}:={as_argument(value)}")]
@@ -34,7 +35,8 @@ class Process:
         environment = {**os.environ, "PYTHONPATH": str(ROOT), "ROS_LOG_DIR": str(log.parent / "ros")}
         log.touch()
         files = os.devnull, log, log
-        self._process = parent().start(f"rsea_ros.nodes.{name}", ["--ros-args", *words], environment, files)
+        module = name if (HERE / f"{name}.py").is_file() else f"rsea_ros.nodes.{name}"
+        self._process = parent().start(module, ["--ros-args", *words], environment, files)
 
     @property
     def output(self):

@@ -205,7 +205,7 @@ def test_of_a_stop_and_a_clear_in_the_same_ms_the_stop_holds(leg, order):
     node = leg.listener.node
     clients = [node.create_client(Trigger, f"/leg/driver/{service}") for service in order]
     leg.until(lambda: all(client.service_is_ready() for client in clients))
-    for _ in range(3):
+    for _ in range(2):
         leg.ready()
         assert leg.call("stop").success
         answers = [client.call_async(Trigger.Request()) for client in clients]
