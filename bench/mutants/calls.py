@@ -97,15 +97,19 @@ def _note() -> None:
 def tests_of(target: str, where: str) -> tuple[list[str], list[str]]:
     """Return the tests that may notice a fault in a function, the nearest first; those that wait apart.
 
-    Those that call it; for what is outside a function, compiled, or called by none, all that call anything of
-    its module or stand in its folder, then those that call anything of the modules that import it.
+    Those that call it; for what is outside a function, compiled, or called by none, all that import its
+    module, call anything of it or stand in its folder, then those that call anything of its importers.
     """
     known = calls()
     name = where.rpartition(".")[2]
     found = known.tests.get((target, name), set())
-    beside = [u for u in known.seconds if u.startswith(f"test/{Path(target).parent}/")]
+    module = f"rsea_ros.{target.replace('/', '.')}"
+    beside = [
+        u for u in known.seconds
+        if u.startswith(f"test/{Path(target).parent}/") or module in _imported(ROOT / u.partition("::")[0])
+    ]  # fmt: skip
     groups: list[Iterable[str]] = (
-        [found] if found else [{*_of_modules([target]), *beside}, _of_modules(_importers(target))]
+        [found] if found else [{*_of_modules([target]), *beside}, _of_modules(_importers(module))]
     )
     ordered: list[str] = []
     for group in groups:
@@ -148,9 +152,8 @@ def _within_limit(units: Sequence[str]) -> list[str]:
     return chosen
 
 
-def _importers(target: str) -> list[str]:
+def _importers(name: str) -> list[str]:
     """Return the modules of rsea_ros that import a module by its name."""
-    name = f"rsea_ros.{target.replace('/', '.')}"
     package = ROOT / "rsea_ros"
     return [
         str(path.relative_to(package).with_suffix(""))

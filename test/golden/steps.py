@@ -20,7 +20,6 @@ from written import short, sums, text_of
 import rsea_ros as rsea
 from rsea_ros.cli.main import verbs
 from rsea_ros.effects.catalogue import catalogue
-from rsea_ros.hardware.peer import registers
 from rsea_ros.laws import terms
 from rsea_ros.model.rig_file import rig_names, rig_text
 from rsea_ros.nodes._policies import NODES
@@ -260,31 +259,14 @@ def nodes(folder: Path) -> Iterator[str]:
         yield out.getvalue()
 
 
-def catalogues(folder: Path) -> Iterator[str]:
-    """Yield what is listed in code: the terms of laws, the tables of emulated motors."""
+def terms_of_laws(folder: Path) -> Iterator[str]:
+    """Yield what is listed in code: the terms that laws are made of."""
     waves = (*terms.wave_terms(7.0), *terms.waves("hip_", "load", "the hip", "N m", 1.0, "q"))
     found = (*terms.hum_terms(50.0), *terms.mode_terms((20.0,)), *waves)
     listed = (terms.GEAR_TERMS, terms.COMMAND_TERMS, terms.SPRING_TERMS, terms.SENSOR_TERMS, terms.LOAD_TERMS,
               terms.ENCODER_TERMS, found)  # fmt: skip
     for term in chain.from_iterable(listed):
         yield " | ".join(str(v) for v in (*astuple(term), term.remembers))
-    shown = set[int]()
-    for number, model in (*registers.MODELS.items(), (1, registers.ENCODER)):
-        limits = (_exact(model.registers[n].high) for n in ("torque_limit", "max_voltage") if number != 1)
-        yield f"motor {_exact(number)}: {_exact(model.counts_per_turn)} a turn, limits {' '.join(limits)}, " + (
-            f"{short(model.ampere)} A, {short(model.radian_per_second)} rad/s, {short(model.constant)} N m/A"
-        )
-        kind = id(model.registers) if number < 1000 or number >= 2000 else model.registers["baud"].start
-        for name, r in model.registers.items() if kind not in shown else ():
-            yield f"  {name} {r.access} {r.signed} " + " ".join(
-                _exact(v) for v in (r.address, r.size, r.low, r.high, r.start)
-            )
-        shown.add(kind)
-
-
-def _exact(value: int) -> str:
-    """Return a number as a word, which no rounding touches."""
-    return f"#{value:_}"
 
 
 def _options(parser: argparse.ArgumentParser, indent: str) -> Iterator[str]:
@@ -306,6 +288,6 @@ def _options(parser: argparse.ArgumentParser, indent: str) -> Iterator[str]:
 SCRIPTS: dict[str, Callable[[Path], Iterator[str]]] = {
     "effects_in_motion": effects_in_motion, "observed": observed, "worn_fleet": worn_fleet,
     "few_days": few_days, "helps": helps, "nodes": nodes,
-    "catalogues": catalogues,
+    "terms_of_laws": terms_of_laws,
 }  # fmt: skip
 """What no line of the command line shows."""
