@@ -103,13 +103,9 @@ def tests_of(target: str, where: str) -> tuple[list[str], list[str]]:
     known = calls()
     name = where.rpartition(".")[2]
     found = known.tests.get((target, name), set())
-    module = f"rsea_ros.{target.replace('/', '.')}"
-    beside = [
-        u for u in known.seconds
-        if u.startswith(f"test/{Path(target).parent}/") or module in _imported(ROOT / u.partition("::")[0])
-    ]  # fmt: skip
+    beside = [u for u in known.seconds if _imports(u, target) or u.startswith(f"test/{Path(target).parent}/")]
     groups: list[Iterable[str]] = (
-        [found] if found else [{*_of_modules([target]), *beside}, _of_modules(_importers(module))]
+        [found] if found else [{*_of_modules([target]), *beside}, _of_modules(_importers(target))]
     )
     ordered: list[str] = []
     for group in groups:
@@ -134,12 +130,13 @@ def _of_modules(targets: Iterable[str]) -> set[str]:
     return {u for (target, _), units in calls().tests.items() if target in wanted for u in units}
 
 
-def _distance(target: str, unit: str) -> tuple[bool, bool, float]:
-    """By its name, by its folder, and a test of little before one of much."""
+def _distance(target: str, unit: str) -> tuple[bool, bool, bool, float]:
+    """By its name, by what it imports, by its folder, and a test of little before one of much."""
     stem, folder = Path(target).name.strip("_"), str(Path(target).parent)
     known = calls()
     far = known.width.get(unit, 0) * (1.0 + known.seconds.get(unit, 0.0))
-    return stem not in Path(unit).name, not unit.startswith(f"test/{folder}/"), far
+    beside = unit.startswith(f"test/{folder}/")
+    return stem not in Path(unit).name, not _imports(unit, target), not beside, far
 
 
 def _within_limit(units: Sequence[str]) -> list[str]:
@@ -152,8 +149,13 @@ def _within_limit(units: Sequence[str]) -> list[str]:
     return chosen
 
 
-def _importers(name: str) -> list[str]:
+def _imports(unit: str, target: str) -> bool:
+    return f"rsea_ros.{target.replace('/', '.')}" in _imported(ROOT / unit.partition("::")[0])
+
+
+def _importers(target: str) -> list[str]:
     """Return the modules of rsea_ros that import a module by its name."""
+    name = f"rsea_ros.{target.replace('/', '.')}"
     package = ROOT / "rsea_ros"
     return [
         str(path.relative_to(package).with_suffix(""))
