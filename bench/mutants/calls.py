@@ -40,7 +40,7 @@ LONGEST = 1500.0
 """s for one run of the suite under the recorder."""
 LIMIT = 90.0
 """s of CPU of the tests that are played for a fault; the nearest file in any case."""
-WIRES = 3
+WIRES = 6
 """Files that wait, of those."""
 
 
