@@ -19,6 +19,7 @@ from written import short, sums, text_of
 
 import rsea_ros as rsea
 from rsea_ros.cli.main import verbs
+from rsea_ros.diagnosis.settings import DEFAULT
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.laws import terms
 from rsea_ros.model.rig_file import rig_names, rig_text
@@ -269,6 +270,12 @@ def terms_of_laws(folder: Path) -> Iterator[str]:
         yield " | ".join(str(v) for v in (*astuple(term), term.remembers))
 
 
+def settings(folder: Path) -> Iterator[str]:
+    """Yield every number that steers a verdict, with its meaning, unit and reason."""
+    for setting in DEFAULT.numbers():
+        yield " | ".join(str(v) for v in setting)
+
+
 def _options(parser: argparse.ArgumentParser, indent: str) -> Iterator[str]:
     for action in parser._actions:
         if isinstance(action, argparse._SubParsersAction):
@@ -288,6 +295,6 @@ def _options(parser: argparse.ArgumentParser, indent: str) -> Iterator[str]:
 SCRIPTS: dict[str, Callable[[Path], Iterator[str]]] = {
     "effects_in_motion": effects_in_motion, "observed": observed, "worn_fleet": worn_fleet,
     "few_days": few_days, "helps": helps, "nodes": nodes,
-    "terms_of_laws": terms_of_laws,
+    "terms_of_laws": terms_of_laws, "settings": settings,
 }  # fmt: skip
 """What no line of the command line shows."""

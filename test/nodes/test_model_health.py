@@ -138,7 +138,8 @@ def test_a_report_says_what_all_of_its_parts_say():
     assert report.values == {
         "verdict": "pure", "tolerance": "0.1", "error_share": "0.0321", "error_edge_hz": "12.35",
         "error_edge_low_hz": "11.00", "error_edge_high_hz": "14.00", "bandwidth_hz": "20.00",
-        "eq_7_hz": "88.00", "occupied_hz": "3.50", "share_above": "0.2500", "gain_error_db": "3.50", "phase_error_deg": "-7.0",
+        "eq_7_hz": "88.00", "occupied_hz": "3.50", "share_above": "0.2500", "gain_error_db": "3.50",
+        "phase_error_deg": "-7.0",
         "sigma_distal": "0.1234", "sigma_proximal": "0.2", "disturbance": "1.5", "sigma_disturbance": "0.75",
         "ft_age_ms": "12.5", "late_samples": 5, "too_late_samples": 6, "refused_messages": 3,
         "unstamped_commands": 4, "restarts": 7, "ft.innovation": "1.250", "ft.innovation_limit": "1.500",
