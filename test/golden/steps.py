@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import importlib
+import re
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import redirect_stdout
@@ -15,12 +16,14 @@ from typing import Any
 
 import numpy as np
 from fleet_histories import cause, history, recordings
-from written import short, sums, text_of
+from written import rounded, short, sums, text_of
 
 import rsea_ros as rsea
 from rsea_ros.cli.main import verbs
 from rsea_ros.diagnosis.settings import DEFAULT
 from rsea_ros.effects.catalogue import catalogue
+from rsea_ros.errors import RseaError
+from rsea_ros.exports.others import coverage_lines
 from rsea_ros.laws import terms
 from rsea_ros.model.rig_file import rig_names, rig_text
 from rsea_ros.nodes._policies import NODES
@@ -260,6 +263,29 @@ def nodes(folder: Path) -> Iterator[str]:
         yield out.getvalue()
 
 
+def exports(folder: Path) -> Iterator[str]:
+    """Yield what each target makes of every kind of rig and effect, a line that came before not again."""
+    base = rsea.load_rig("paper_moving_output")
+    rigs = {name: rsea.load_rig(name) for name in rig_names()}
+    for name in catalogue():
+        rigs[name] = (rigs["pendulum"] if name == "gravity_error" else base).with_effect(name)
+    for target in ("mjcf", "urdf", "sdf", "isaac", "bam", "feedforward"):
+        module = importlib.import_module(f"rsea_ros.exports.{'urdf' if target == 'sdf' else target}")
+        seen = set[str]()
+        for name, rig in rigs.items():
+            try:
+                made = getattr(module, f"export_{target}")(rig)
+            except RseaError as error:
+                yield f"{target} of {name}: {error}"
+                continue
+            texts = made.content.values() if isinstance(made.content, dict) else [made.content]
+            lines = rounded("\n".join([*texts, *coverage_lines(made.says, made.leaves_out)])).splitlines()
+            lines = [line.strip() for line in lines if not re.match(r"-?\d[^,]*,", line)]  # no tables
+            new = [line for line in lines if line not in seen]
+            seen |= set(new)
+            yield "\n  ".join([f"{target} of {name}:", *new])
+
+
 def terms_of_laws(folder: Path) -> Iterator[str]:
     """Yield what is listed in code: the terms that laws are made of."""
     waves = (*terms.wave_terms(7.0), *terms.waves("hip_", "load", "the hip", "N m", 1.0, "q"))
@@ -295,6 +321,6 @@ def _options(parser: argparse.ArgumentParser, indent: str) -> Iterator[str]:
 SCRIPTS: dict[str, Callable[[Path], Iterator[str]]] = {
     "effects_in_motion": effects_in_motion, "observed": observed, "worn_fleet": worn_fleet,
     "few_days": few_days, "helps": helps, "nodes": nodes,
-    "terms_of_laws": terms_of_laws, "settings": settings,
+    "terms_of_laws": terms_of_laws, "settings": settings, "exports": exports,
 }  # fmt: skip
 """What no line of the command line shows."""
