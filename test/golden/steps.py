@@ -302,9 +302,9 @@ def terms_of_laws(folder: Path) -> Iterator[str]:
 def written_laws(folder: Path) -> Iterator[str]:
     """Yield the file of each term, of a curve over each variable and place, and of a law of two terms."""
     ranges = {"w": 0.6, "q": 0.02, "h": 0.3, "theta": 10.0, "d": 0.02, "T": 30.0, "u": 24.0}
-    listed = (terms.GEAR_TERMS, terms.COMMAND_TERMS, terms.MOTOR_TERMS, terms.SPRING_TERMS, terms.SENSOR_TERMS,
-              terms.LOAD_TERMS, terms.ENCODER_TERMS, terms.wave_terms(7.0), terms.hum_terms(50.0),
-              terms.mode_terms((20.0,)))  # fmt: skip
+    listed = (terms.GEAR_TERMS, terms.COMMAND_TERMS, terms.MOTOR_TERMS, terms.SPRING_TERMS,
+              terms.SENSOR_TERMS, terms.LOAD_TERMS, terms.ENCODER_TERMS, terms.wave_terms(7.0),
+              terms.hum_terms(50.0), terms.mode_terms((20.0,)))  # fmt: skip
     fitted = [FittedTerm(term, 1.5, 0.25 if term.shape else 0.0) for term in chain.from_iterable(listed)]
     laws = [Law(f"law_{p.term.name}", p.term.place, p.term.regressor, (p,), ranges) for p in fitted]
     past = [p for p in fitted if p.term.memory and p.term.place == "spring"]
