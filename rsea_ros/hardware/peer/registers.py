@@ -153,18 +153,12 @@ def _models() -> dict[int, MotorModel]:
 
 
 MODELS = _models()
-ENCODER = MotorModel(
-    1,
-    {
-        "id": Register(7, 1, EEPROM, 0, 252, 1),
-        "return_delay": Register(9, 1, EEPROM, 0, 254),
-        "homing_offset": Register(20, 4, EEPROM, *_ANY, signed=True),
-        "status_level": Register(68, 1, RAM, 0, 2, 2),
-        "hardware_error": Register(70, 1, READ_ONLY),
-        "position": Register(132, 4, READ_ONLY, signed=True),
-    },
-    0.0,
-    0.0,
-    1 << 20,
-)
+ENCODER = MotorModel(1, {
+    "id": Register(7, 1, EEPROM, 0, 252, 1),
+    "return_delay": Register(9, 1, EEPROM, 0, 254),
+    "homing_offset": Register(20, 4, EEPROM, *_ANY, signed=True),
+    "status_level": Register(68, 1, RAM, 0, 2, 2),
+    "hardware_error": Register(70, 1, READ_ONLY),
+    "position": Register(132, 4, READ_ONLY, signed=True),
+}, 0.0, 0.0, 1 << 20)  # fmt: skip
 """A microcontroller with an encoder of 20 bits, whose angle is where an X motor has its position."""
