@@ -40,7 +40,7 @@ LONGEST = 1500.0
 """s for one run of the suite under the recorder."""
 LIMIT = 90.0
 """s of CPU of the tests that are played for a fault; the nearest file in any case."""
-WIRES = 3
+WIRES = 6
 """Files that wait, of those."""
 
 
@@ -97,13 +97,13 @@ def _note() -> None:
 def tests_of(target: str, where: str) -> tuple[list[str], list[str]]:
     """Return the tests that may notice a fault in a function, the nearest first; those that wait apart.
 
-    Those that call it; for what is outside a function, compiled, or called by none, all that call anything of
-    its module or stand in its folder, then those that call anything of the modules that import it.
+    Those that call it; for what is outside a function, compiled, or called by none, all that import its
+    module, call anything of it or stand in its folder, then those that call anything of its importers.
     """
     known = calls()
     name = where.rpartition(".")[2]
     found = known.tests.get((target, name), set())
-    beside = [u for u in known.seconds if u.startswith(f"test/{Path(target).parent}/")]
+    beside = [u for u in known.seconds if _imports(u, target) or u.startswith(f"test/{Path(target).parent}/")]
     groups: list[Iterable[str]] = (
         [found] if found else [{*_of_modules([target]), *beside}, _of_modules(_importers(target))]
     )
@@ -130,12 +130,13 @@ def _of_modules(targets: Iterable[str]) -> set[str]:
     return {u for (target, _), units in calls().tests.items() if target in wanted for u in units}
 
 
-def _distance(target: str, unit: str) -> tuple[bool, bool, float]:
-    """By its name, by its folder, and a test of little before one of much."""
+def _distance(target: str, unit: str) -> tuple[bool, bool, bool, float]:
+    """By its name, by what it imports, by its folder, and a test of little before one of much."""
     stem, folder = Path(target).name.strip("_"), str(Path(target).parent)
     known = calls()
     far = known.width.get(unit, 0) * (1.0 + known.seconds.get(unit, 0.0))
-    return stem not in Path(unit).name, not unit.startswith(f"test/{folder}/"), far
+    beside = unit.startswith(f"test/{folder}/")
+    return stem not in Path(unit).name, not _imports(unit, target), not beside, far
 
 
 def _within_limit(units: Sequence[str]) -> list[str]:
@@ -146,6 +147,10 @@ def _within_limit(units: Sequence[str]) -> list[str]:
             chosen.append(unit)
             spent += needs
     return chosen
+
+
+def _imports(unit: str, target: str) -> bool:
+    return f"rsea_ros.{target.replace('/', '.')}" in _imported(ROOT / unit.partition("::")[0])
 
 
 def _importers(target: str) -> list[str]:

@@ -1,8 +1,9 @@
 """Writes which functions of rsea_ros each file of tests calls; loaded by pytest and by all that tests start.
 
 A line is `file of tests, tab, module, tab, function`, or `file, tab, seconds of CPU`; RECORD names the file
-of lines. A step of test/golden stands for a file. Compiled functions and those that ran in a fixture of
-another file are not seen. PYTEST_DONT_REWRITE: it is loaded before pytest is.
+of lines. A step of test/golden stands for a file. Not seen are compiled functions, those that ran in a
+fixture of another file, and what runs while a module is imported: for whatever test comes first.
+PYTEST_DONT_REWRITE: it is loaded before pytest is.
 """
 
 from __future__ import annotations
@@ -34,12 +35,25 @@ def note(frame: FrameType, event: str, argument: object) -> None:
     code = frame.f_code
     if id(code) in _seen:
         return
+    is_own = code.co_filename.startswith(PACKAGE) and bool(code.co_flags & FUNCTION)
+    if is_own and _is_importing(frame):
+        return
     _seen.add(id(code))
-    if code.co_filename.startswith(PACKAGE) and code.co_flags & FUNCTION:
+    if is_own:
         place = unit(os.environ.get("PYTEST_CURRENT_TEST", "").rpartition(" ")[0])
         target = code.co_filename.removeprefix(PACKAGE).removesuffix(".py")
         if place:
             os.write(LINES, f"{place}\t{target}\t{code.co_name}\n".encode())
+
+
+def _is_importing(frame: FrameType | None) -> bool:
+    """Return whether a function runs for the body of a module of the package."""
+    while frame is not None:
+        code = frame.f_code
+        if code.co_name == "<module>" and code.co_filename.startswith(PACKAGE):
+            return frame.f_globals["__name__"] != "__main__"
+        frame = frame.f_back
+    return False
 
 
 def _used() -> float:

@@ -35,7 +35,7 @@ def day_means(series: Series, settings: TrendSettings) -> Days:
     s = series.keep(series.identifiable)
     s = s.keep(~outliers(s.time_s, s.value, s.sd, settings.outlier_days))
     size = np.abs(s.value)
-    scale = float(np.median(size) if len(size) else 0.0) or float(np.max(size, initial=0.0)) or 1.0
+    scale = float(np.median(size) or np.max(size) or 1.0) if len(size) else 1.0
     day = np.floor(s.time_s / DAY)
     starts = np.flatnonzero(np.diff(day, prepend=-np.inf))
     y, variance = s.value / scale, np.maximum(s.sd / scale, 1e-9) ** 2

@@ -4,20 +4,30 @@ from __future__ import annotations
 
 import argparse
 import importlib
+import re
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import redirect_stdout
+from dataclasses import astuple
 from io import StringIO
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from fleet_histories import cause, history, recordings
-from written import short, sums, text_of
+from written import rounded, short, sums, text_of
 
 import rsea_ros as rsea
 from rsea_ros.cli.main import verbs
+from rsea_ros.diagnosis.settings import DEFAULT
 from rsea_ros.effects.catalogue import catalogue
+from rsea_ros.effects.effect import Claims
+from rsea_ros.errors import RseaError
+from rsea_ros.exports.others import coverage_lines
+from rsea_ros.laws import terms
+from rsea_ros.laws.effect_source import LawProvenance, source_of
+from rsea_ros.laws.law import FittedTerm, Law, LearntCurve
 from rsea_ros.model.rig_file import rig_names, rig_text
 from rsea_ros.nodes._policies import NODES
 from rsea_ros.report.fleet.page import write_fleet_report
@@ -256,6 +266,70 @@ def nodes(folder: Path) -> Iterator[str]:
         yield out.getvalue()
 
 
+def exports(folder: Path) -> Iterator[str]:
+    """Yield what each target makes of every kind of rig and effect, a line that came before not again."""
+    base = rsea.load_rig("paper_moving_output")
+    rigs = {name: rsea.load_rig(name) for name in rig_names()}
+    for name in catalogue():
+        rigs[name] = (rigs["pendulum"] if name == "gravity_error" else base).with_effect(name)
+    for target in ("mjcf", "urdf", "sdf", "isaac", "bam", "feedforward"):
+        module = importlib.import_module(f"rsea_ros.exports.{'urdf' if target == 'sdf' else target}")
+        seen = set[str]()
+        for name, rig in rigs.items():
+            try:
+                made = getattr(module, f"export_{target}")(rig)
+            except RseaError as error:
+                yield f"{target} of {name}: {error}"
+                continue
+            texts = made.content.values() if isinstance(made.content, dict) else [made.content]
+            lines = rounded("\n".join([*texts, *coverage_lines(made.says, made.leaves_out)])).splitlines()
+            lines = [line.strip() for line in lines if not re.match(r"-?\d[^,]*,", line)]  # no tables
+            new = [line for line in lines if line not in seen]
+            seen |= set(new)
+            yield "\n  ".join([f"{target} of {name}:", *new])
+
+
+def terms_of_laws(folder: Path) -> Iterator[str]:
+    """Yield what is listed in code: the terms that laws are made of."""
+    waves = (*terms.wave_terms(7.0), *terms.waves("hip_", "load", "the hip", "N m", 1.0, "q"))
+    found = (*terms.hum_terms(50.0), *terms.mode_terms((20.0,)), *waves)
+    listed = (terms.GEAR_TERMS, terms.COMMAND_TERMS, terms.SPRING_TERMS, terms.SENSOR_TERMS, terms.LOAD_TERMS,
+              terms.ENCODER_TERMS, found)  # fmt: skip
+    for term in chain.from_iterable(listed):
+        yield " | ".join(str(v) for v in (*astuple(term), term.remembers))
+
+
+def written_laws(folder: Path) -> Iterator[str]:
+    """Yield the file of each term, of a curve over each variable and place, and of a law of two terms."""
+    ranges = {"w": 0.6, "q": 0.02, "h": 0.3, "theta": 10.0, "d": 0.02, "T": 30.0, "u": 24.0}
+    listed = (terms.GEAR_TERMS, terms.COMMAND_TERMS, terms.MOTOR_TERMS, terms.SPRING_TERMS,
+              terms.SENSOR_TERMS, terms.LOAD_TERMS, terms.ENCODER_TERMS, terms.wave_terms(7.0),
+              terms.hum_terms(50.0), terms.mode_terms((20.0,)))  # fmt: skip
+    fitted = [FittedTerm(term, 1.5, 0.25 if term.shape else 0.0) for term in chain.from_iterable(listed)]
+    laws = [Law(f"law_{p.term.name}", p.term.place, p.term.regressor, (p,), ranges) for p in fitted]
+    past = [p for p in fitted if p.term.memory and p.term.place == "spring"]
+    laws.append(Law("law_of_two", "spring", "past", (past[0], past[-1]), ranges))
+    x = np.linspace(-0.5, 0.5, 5)
+    laws += [
+        Law(f"curve_of_{letter}_{place}", place, "x", (), ranges, LearntCurve(letter, factor, x, 2.0 * x**3))
+        for place in ("gear", "motor", "command", "spring", "ft", "load", "encoder")
+        for letter, factor in (("w", ""), ("T", ""), ("u", "w"))
+    ]
+    claims, where = Claims("velocity", "neither", None), LawProvenance("DAY", "0", {"a.mcap": "ab"}, "Gain.")
+    seen = set[str]()
+    for law in laws:
+        lines = source_of(law, claims, where).splitlines()
+        new = [line for line in lines if line not in seen or line.startswith(("    s[", "    torque"))]
+        seen |= set(new)
+        yield "\n".join([f"{law.name} at {law.place}:", *new])
+
+
+def settings(folder: Path) -> Iterator[str]:
+    """Yield every number that steers a verdict, with its meaning, unit and reason."""
+    for setting in DEFAULT.numbers():
+        yield " | ".join(str(v) for v in setting)
+
+
 def _options(parser: argparse.ArgumentParser, indent: str) -> Iterator[str]:
     for action in parser._actions:
         if isinstance(action, argparse._SubParsersAction):
@@ -275,5 +349,7 @@ def _options(parser: argparse.ArgumentParser, indent: str) -> Iterator[str]:
 SCRIPTS: dict[str, Callable[[Path], Iterator[str]]] = {
     "effects_in_motion": effects_in_motion, "observed": observed, "worn_fleet": worn_fleet,
     "few_days": few_days, "helps": helps, "nodes": nodes,
+    "terms_of_laws": terms_of_laws, "settings": settings, "exports": exports,
+    "written_laws": written_laws,
 }  # fmt: skip
 """What no line of the command line shows."""

@@ -103,3 +103,87 @@ def test_states_that_do_not_follow_the_commands_are_reported():
     node.run(2.0)
     node.inputs.stopped.unmoved = True
     assert UNMOVED in node.health.report().summary
+
+
+def reported(**changes):
+    """Return the report of a node whose parts say what is given."""
+    node = Node(10.0, lambda t, torque: torque)
+    health = node.health
+    health.estimate = SimpleNamespace(
+        sigma_distal=0.1234, sigma_proximal=0.2, disturbance=1.5, sigma_disturbance=0.75
+    )
+    health._inputs = SimpleNamespace(**{**vars(node.inputs), "ft_age": 0.0125, "refused": 3, "unstamped": 4,
+                                        **changes.pop("inputs", {})})  # fmt: skip
+    edge = SimpleNamespace(hz=12.345, low=11.0, high=14.0)
+    health._error = SimpleNamespace(
+        verdict="pure", share=0.0321, edge=edge, torque=5.0, settings=SimpleNamespace(tolerance=0.1)
+    )
+    health._torque_band = SimpleNamespace(
+        edge=20.0, occupied=lambda: SimpleNamespace(hz=3.5, share_above=0.25),
+        error_at=lambda hz: (hz, -2.0 * hz),
+    )  # fmt: skip
+    tests = changes.pop("tests", {})
+    health._observer = SimpleNamespace(late=5, refused=6, restarts=7, consistency=lambda: tests)
+    health._eq_7 = 88.0
+    return health, health.report()
+
+
+def looked(ratio, broken):
+    return SimpleNamespace(ratio=ratio, limit=1.5, broken=broken, mean=0.01)
+
+
+def test_a_report_says_what_all_of_its_parts_say():
+    _, report = reported(tests={"ft": looked(1.25, False)})
+    assert (report.level, report.summary) == (OK, "pure")
+    assert report.values == {
+        "verdict": "pure", "tolerance": "0.1", "error_share": "0.0321", "error_edge_hz": "12.35",
+        "error_edge_low_hz": "11.00", "error_edge_high_hz": "14.00", "bandwidth_hz": "20.00",
+        "eq_7_hz": "88.00", "occupied_hz": "3.50", "share_above": "0.2500", "gain_error_db": "3.50",
+        "phase_error_deg": "-7.0",
+        "sigma_distal": "0.1234", "sigma_proximal": "0.2", "disturbance": "1.5", "sigma_disturbance": "0.75",
+        "ft_age_ms": "12.5", "late_samples": 5, "too_late_samples": 6, "refused_messages": 3,
+        "unstamped_commands": 4, "restarts": 7, "ft.innovation": "1.250", "ft.innovation_limit": "1.500",
+        "ft.innovation_mean": "0.01",
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"tests": {"ft": looked(2.0, True)}},
+         "model inconsistent with ft: innovations 2.00 times theirs (limit 1.50)"),
+        ({"inputs": {"stopped": SimpleNamespace(frozen=["ft"], unmoved=True)}},
+         "ft repeats one value: the sensor has stopped"),
+        ({"inputs": {"stopped": SimpleNamespace(frozen=[], unmoved=True)}}, UNMOVED),
+        ({"inputs": {"ft_silent": True}},
+         "no ft for 0.01 s: estimated without it, sigma of the distal torque 0.123 N·m"),
+    ],
+)  # fmt: skip
+def test_a_report_warns_of_each_trouble(changes, said):
+    _, report = reported(**changes)
+    assert (report.level, report.summary) == (WARN, said)
+
+
+def test_a_sensor_off_by_more_than_is_tolerated_contradicts():
+    """Tolerated: a tenth of 5 N m, of innovations whose noise is 0.2 N m."""
+    health, _ = reported()
+    health._errors = {"ft": 0.2, "position": 0.2}
+    tests = {"ft": looked(2.6, True), "position": looked(2.4, True)}
+    assert health._contradictions(tests) == [
+        "ft differs from model and other sensors by 0.52 N·m RMS, limit 0.5 N·m"
+    ]
+    assert health._contradictions({"ft": looked(2.6, False)}) == []
+    health._error.share = math.nan
+    assert health._contradictions(tests) == []
+
+
+def test_the_band_learns_the_noise_where_it_has_settled_or_changed():
+    health, _ = reported(inputs={"period": 0.01})
+    learnt = []
+    health._torque_band = SimpleNamespace(calibrate=lambda error, period: learnt.append((error, period)))
+    health._observer = SimpleNamespace(error_model=lambda period: f"error at {period}")
+    estimate = health.estimate
+    for sigma, period in ((0.1, 0.01), (0.109, 0.0109), (0.112, 0.01), (0.112, 0.0112), (0.112, math.nan)):
+        health._inputs.period, estimate.sigma_distal = period, sigma
+        health._calibrate()
+    assert learnt == [("error at 0.01", 0.01), ("error at 0.01", 0.01), ("error at 0.0112", 0.0112)]

@@ -34,6 +34,8 @@ class MotorModel:
     constant: float = 6.826
 
 
+_ANY = -(2**31), 2**31 - 1
+"""What 4 bytes with a sign can say."""
 _RPM = 2.0 * 3.141592653589793 / 60.0
 
 _PRO = {
@@ -41,15 +43,15 @@ _PRO = {
     "baud": Register(8, 1, EEPROM, 0, 8, 3),
     "return_delay": Register(9, 1, EEPROM, 0, 254, 250),
     "mode": Register(11, 1, EEPROM, 0, 4, 3),
-    "homing_offset": Register(13, 4, EEPROM, -(2**31), 2**31 - 1, signed=True),
+    "homing_offset": Register(13, 4, EEPROM, *_ANY, signed=True),
     "temperature_limit": Register(21, 1, EEPROM, 0, 100, 80),
     "max_voltage": Register(22, 2, EEPROM, 0, 400, 400),
     "min_voltage": Register(24, 2, EEPROM, 0, 400, 150),
     "torque_limit": Register(30, 2, EEPROM, 0, 1860, 620),
     "shutdown": Register(48, 1, EEPROM, 0, 63, 58),
     "torque_enable": Register(562, 1, RAM, 0, 1),
-    "goal_position": Register(596, 4, RAM, -(2**31), 2**31 - 1, signed=True),
-    "goal_velocity": Register(600, 4, RAM, -(2**31), 2**31 - 1, signed=True),
+    "goal_position": Register(596, 4, RAM, *_ANY, signed=True),
+    "goal_velocity": Register(600, 4, RAM, *_ANY, signed=True),
     "goal": Register(604, 2, RAM, -1860, 1860, signed=True),
     "position": Register(611, 4, READ_ONLY, signed=True),
     "velocity": Register(615, 4, READ_ONLY, signed=True),
@@ -65,7 +67,7 @@ _COMMON = {
     "return_delay": Register(9, 1, EEPROM, 0, 254, 250),
     "drive_mode": Register(10, 1, EEPROM, 0, 13),
     "mode": Register(11, 1, EEPROM, 0, 16, 3),
-    "homing_offset": Register(20, 4, EEPROM, -(2**31), 2**31 - 1, signed=True),
+    "homing_offset": Register(20, 4, EEPROM, *_ANY, signed=True),
     "temperature_limit": Register(31, 1, EEPROM, 0, 100, 80),
     "startup": Register(60, 1, EEPROM, 0, 3),
 }
@@ -83,8 +85,8 @@ _PRO_A = _COMMON | {
     "watchdog": Register(546, 1, RAM, 0, 127, signed=True),
     "goal_pwm": Register(548, 2, RAM, -2009, 2009, signed=True),
     "goal": Register(550, 2, RAM, -22740, 22740, signed=True),
-    "goal_velocity": Register(552, 4, RAM, -(2**31), 2**31 - 1, signed=True),
-    "goal_position": Register(564, 4, RAM, -(2**31), 2**31 - 1, signed=True),
+    "goal_velocity": Register(552, 4, RAM, *_ANY, signed=True),
+    "goal_position": Register(564, 4, RAM, *_ANY, signed=True),
     "tick": Register(568, 2, READ_ONLY),
     "current": Register(574, 2, READ_ONLY, signed=True),
     "velocity": Register(576, 4, READ_ONLY, signed=True),
@@ -110,8 +112,8 @@ def _x(current: int, voltage: tuple[int, int, int]) -> dict[str, Register]:
         "watchdog": Register(98, 1, RAM, 0, 127, signed=True),
         "goal_pwm": Register(100, 2, RAM, -885, 885, signed=True),
         "goal": Register(102, 2, RAM, -current, current, signed=True),
-        "goal_velocity": Register(104, 4, RAM, -(2**31), 2**31 - 1, signed=True),
-        "goal_position": Register(116, 4, RAM, -(2**31), 2**31 - 1, signed=True),
+        "goal_velocity": Register(104, 4, RAM, *_ANY, signed=True),
+        "goal_position": Register(116, 4, RAM, *_ANY, signed=True),
         "tick": Register(120, 2, READ_ONLY),
         "current": Register(126, 2, READ_ONLY, signed=True),
         "velocity": Register(128, 4, READ_ONLY, signed=True),
@@ -151,18 +153,12 @@ def _models() -> dict[int, MotorModel]:
 
 
 MODELS = _models()
-ENCODER = MotorModel(
-    1,
-    {
-        "id": Register(7, 1, EEPROM, 0, 252, 1),
-        "return_delay": Register(9, 1, EEPROM, 0, 254),
-        "homing_offset": Register(20, 4, EEPROM, -(2**31), 2**31 - 1, signed=True),
-        "status_level": Register(68, 1, RAM, 0, 2, 2),
-        "hardware_error": Register(70, 1, READ_ONLY),
-        "position": Register(132, 4, READ_ONLY, signed=True),
-    },
-    0.0,
-    0.0,
-    1 << 20,
-)
+ENCODER = MotorModel(1, {
+    "id": Register(7, 1, EEPROM, 0, 252, 1),
+    "return_delay": Register(9, 1, EEPROM, 0, 254),
+    "homing_offset": Register(20, 4, EEPROM, *_ANY, signed=True),
+    "status_level": Register(68, 1, RAM, 0, 2, 2),
+    "hardware_error": Register(70, 1, READ_ONLY),
+    "position": Register(132, 4, READ_ONLY, signed=True),
+}, 0.0, 0.0, 1 << 20)  # fmt: skip
 """A microcontroller with an encoder of 20 bits, whose angle is where an X motor has its position."""

@@ -1,0 +1,221 @@
+"""Lines of a response: each method beside scipy's, or beside least squares and periods made by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy import signal
+
+from rsea_ros.errors import IdentificationError
+from rsea_ros.identification import local_polynomial as lpm
+from rsea_ros.identification.frequency_response import (
+    Periods,
+    find_periods,
+    multisine,
+    sampled_lines,
+    suits,
+    welch,
+)
+from rsea_ros.records.record import Channel, Record
+
+H = 1.0 / 200.0
+RNG = np.random.default_rng(5)
+NUMERATOR, DENOMINATOR = [0.2, 0.3], [1.0, -0.7, 0.2]
+
+
+def aligned(u, y, measured=None):
+    known = np.ones(len(u), bool) if measured is None else measured
+    return lpm.Aligned("ft", 0.0, H, u, y, 0.0, known, np.zeros(1), False, 1.0 / H)
+
+
+def response_at(hz):
+    return signal.freqz(NUMERATOR, DENOMINATOR, 2.0 * np.pi * hz * H)[1]
+
+
+def noisy(n, scale=0.05):
+    u = RNG.standard_normal(n)
+    return u, signal.lfilter(NUMERATOR, DENOMINATOR, u) + scale * RNG.standard_normal(n)
+
+
+def test_welch_is_that_of_scipy_and_its_interval_that_of_many_records() -> None:
+    n = 16_000
+    u, y = noisy(n)
+    found = welch(aligned(u, y))
+    length = round(1.0 / (found.frequency[1] - found.frequency[0]) / H)
+    assert length == 2 * 1152  # 80 s in 7 parts are 2285.7 samples: the next length without large factors
+    options = {"fs": 1.0 / H, "nperseg": length, "detrend": "linear"}
+    f, s_uy = signal.csd(u, y, **options)
+    s_uu, coherence = signal.welch(u, **options)[1], signal.coherence(u, y, **options)[1]
+    np.testing.assert_allclose(found.frequency, f[2:])
+    np.testing.assert_allclose(found.response[:-1], (s_uy / s_uu)[2:-1], rtol=2e-2)
+    np.testing.assert_allclose(found.coherence[:-1], coherence[2:-1], rtol=1e-2, atol=1e-3)
+    assert found.noise is not None  # RMS in a line as wide as 1 / length
+    assert np.sqrt(np.mean(found.noise**2)) == pytest.approx(0.05 * np.sqrt(2.0 / length), rel=0.05)
+    again = np.array([welch(aligned(*noisy(n))).response for _ in range(12)])
+    spread = np.sqrt(np.mean(np.abs(again - response_at(found.frequency)) ** 2))
+    assert np.sqrt(np.mean(found.sd**2)) == pytest.approx(spread * 1.2, rel=0.15)  # widened for 11 segments
+
+
+def test_welch_leaves_out_segments_with_a_gap_and_is_not_for_sweeps_or_short_records() -> None:
+    u, y = noisy(16_000)
+    measured = np.arange(len(u)) != 8000
+    spoiled = np.where(measured, y, 1e6)
+    found = welch(aligned(u, spoiled, measured))
+    np.testing.assert_allclose(found.response, response_at(found.frequency), atol=0.1)
+    assert suits(aligned(u, y)) and not suits(aligned(u, spoiled, measured))  # 11 segments are whole
+    assert not suits(aligned(signal.chirp(H * np.arange(16_000), 1.0, 80.0, 99.0), y))
+    assert not suits(aligned(u[:5000], y[:5000]))
+    assert suits(aligned(u[:6000], y[:6000]))
+
+
+def test_a_repeating_stretch_is_found_with_its_start_period_and_count() -> None:
+    period = RNG.standard_normal(100)
+    whole = np.concatenate([np.zeros(70), np.tile(period, 5)[:460], np.zeros(50)])
+    found = find_periods(whole)
+    assert found is not None and (found.length, found.count) == (100, 4)
+    assert found.first in range(70, 131)
+    assert find_periods(np.concatenate([np.tile(period, 2), np.zeros(300)])) is None
+    assert find_periods(RNG.standard_normal(600)) is None
+    assert find_periods(np.zeros(600)) is None
+
+
+def test_the_lines_of_a_multisine_are_its_response_noise_and_distortion() -> None:
+    """Odd lines are excited, but the 9th of each 20: six such lines are too few for odd distortion."""
+    n, count = 400, 5
+    excited = np.array([k for k in range(1, 120, 2) if k % 20 != 9])
+    silent_odd, even = np.arange(9, 119, 20), np.arange(2, 119, 2)
+    t = np.arange(n)
+
+    def tones(lines, size, phases):
+        return sum(size * np.cos(2.0 * np.pi * k * t / n + p) for k, p in zip(lines, phases, strict=True))
+
+    phases = RNG.uniform(0.0, 6.0, 200)
+    u = tones(excited, 1.0, phases[: len(excited)])
+    y = tones(excited, 2.0, phases[: len(excited)] + 0.3) + tones(even, 0.05, phases[: len(even)])
+    y += tones(silent_odd, 0.04, phases[: len(silent_odd)])
+    whole, first = np.tile(y, count), 7
+    whole[:n] += 5.0  # has not settled
+    noise = 0.3 * RNG.standard_normal((8, n * count))
+    pad = np.zeros(first)
+    given = [aligned(np.append(pad, np.tile(u, count)), np.append(pad, whole + e)) for e in noise]
+    found = [multisine(g, Periods(first, n, count)) for g in given]
+    exact = multisine(aligned(given[0].command, np.append(pad, whole)), Periods(first, n, count))
+    np.testing.assert_allclose(exact.frequency, excited / (n * H))
+    np.testing.assert_allclose(exact.response, 2.0 * np.exp(0.3j), rtol=1e-9)
+    np.testing.assert_allclose(exact.coherence, 1.0, rtol=1e-9)
+    assert exact.distortion == pytest.approx(np.full(len(excited), 0.05 / np.sqrt(2.0)), rel=1e-6)
+    assert exact.noise == pytest.approx(np.zeros(len(excited)), abs=1e-9)
+    levels = np.array([f.noise for f in found])
+    assert np.sqrt(np.mean(levels**2)) == pytest.approx(0.3 * np.sqrt(2.0 / n), rel=0.05)
+    assert np.mean([1.0 - f.coherence for f in found]) == pytest.approx(0.3**2 / n, rel=0.2)
+    spread = np.sqrt(np.mean([np.abs(f.response - 2.0 * np.exp(0.3j)) ** 2 for f in found]))
+    assert np.sqrt(np.mean([f.sd**2 for f in found])) == pytest.approx(1.37 * spread, rel=0.1)  # 3 degrees
+    is_lost = np.arange(first + n * count) == first + 2 * n + 5
+    with_gap = multisine(
+        aligned(given[0].command, np.where(is_lost, 1e9, given[0].output), ~is_lost), Periods(first, n, count)
+    )
+    np.testing.assert_allclose(np.abs(with_gap.response), 2.0, rtol=0.1)
+
+
+def test_odd_and_even_distortion_are_told_apart_and_widen_the_interval() -> None:
+    n, t = 800, np.arange(800)
+    excited = np.array([k for k in range(1, 300, 2) if k % 8 != 5])
+    u = sum(np.cos(2.0 * np.pi * k * t / n + k * k) for k in excited)
+    silent = np.setdiff1d(np.arange(1, 300), excited)
+    odd, even = silent[silent % 2 == 1], silent[silent % 2 == 0]
+    y = 2.0 * u + sum(0.03 * np.cos(2.0 * np.pi * k * t / n + k) for k in odd)
+    y = y + sum(0.04 * np.cos(2.0 * np.pi * k * t / n + k) for k in even)
+    found = multisine(aligned(np.tile(u, 4), np.tile(y, 4)), Periods(0, n, 4))
+    assert found.distortion == pytest.approx(np.full(len(excited), 0.05 / np.sqrt(2.0)), rel=1e-6)
+    assert found.sd == pytest.approx(np.full(len(excited), lpm.widen(0.03, 11.0)), rel=1e-6)
+
+
+def test_the_method_is_that_of_the_command() -> None:
+    t = np.arange(4000)
+    repeats = np.tile(RNG.standard_normal(500), 8)
+    commands = {"multisine": repeats, "local polynomial": signal.chirp(t * H, 0.5, 20.0, 60.0)}
+    for method, u in commands.items():
+        assert sampled_lines(aligned(u, u)).method == method
+    long = RNG.standard_normal(16_000)
+    assert sampled_lines(aligned(long, long)).method == "Welch"
+
+
+def test_local_polynomials_are_least_squares_in_each_band() -> None:
+    u, y = noisy(2000)
+    known = (np.arange(2000) < 700) | (np.arange(2000) > 720)
+    found = lpm.local_polynomial(aligned(u, y, known))
+    u, y = (signal.detrend(x[721:]) for x in (u, y))
+    n = len(u)
+    u, y = np.fft.rfft(u), np.fft.rfft(y)
+    centres = np.rint(found.frequency * n * H).astype(int)
+    assert centres[0] == 8 and centres[1] == 12
+    for centre, g, sd, noise, coherence in zip(
+        centres, found.response, found.sd, found.noise, found.coherence, strict=True
+    ):
+        half = max(8, round(0.03 * centre))
+        first = min(max(1, centre - half), len(u) - 2 * half - 1)
+        band = np.arange(first, first + 2 * half + 1)
+        r = (band - centre) / half
+        columns = np.column_stack([r**p * x for x in (u[band], np.ones(len(band))) for p in range(3)])
+        solved = np.linalg.lstsq(columns, y[band], rcond=None)[0]
+        assert g == pytest.approx(solved[0], rel=1e-5)
+        left = np.sum(np.abs(y[band] - columns @ solved) ** 2) / (len(band) - 6)
+        assert noise == pytest.approx(np.sqrt(2.0 * left) / n, rel=1e-5)
+        variance = left * np.linalg.inv(columns.conj().T @ columns)[0, 0].real
+        m = len(band) - 6
+        wide = m * (0.05 ** (-1.0 / m) - 1.0) / -np.log(0.05)
+        assert sd == pytest.approx(np.sqrt(variance * wide), rel=1e-5)
+        power = np.abs(g) ** 2 * np.mean(np.abs(u[band]) ** 2)
+        assert coherence == pytest.approx(power / (power + left), rel=1e-5)
+    assert np.all(np.diff(centres) == [max(1, max(8, round(0.03 * c)) // 2) for c in centres[:-1]])
+    assert centres[-1] < len(u) - 1
+
+
+def test_a_stretch_is_the_longest_in_which_the_command_changes() -> None:
+    u, y = noisy(2000)
+    u[:1500] = 3.0
+    known = np.arange(2000) != 1500
+    with pytest.raises(lpm.AtRestError, match="never changes"):
+        lpm.local_polynomial(aligned(np.full(2000, 3.0), y))
+    found = lpm.local_polynomial(aligned(u, y, known))
+    assert found.frequency[0] == pytest.approx(8.0 / (499 * H))
+    few = found.up_to(found.frequency[3])
+    assert len(few.frequency) == len(few.response) == len(few.sd) == len(few.coherence) == len(few.noise) == 4
+
+
+def test_the_interval_of_few_degrees_of_freedom_is_that_of_fisher() -> None:
+    """|error|^2 over its estimated variance follows F(2, 2 m); 1.73 sd is its 95 % point for many."""
+    from scipy.stats import f
+
+    for m in (1.0, 3.0, 40.0):
+        expected = np.sqrt(f.ppf(0.95, 2.0, 2.0 * m) / -np.log(0.05))
+        assert lpm.widen(2.0, m) == pytest.approx(2.0 * expected)
+    assert lpm.widen(2.0, 0.5) == lpm.widen(2.0, 1.0)
+
+
+def test_usable_samples_are_finite_and_their_stamps_rise() -> None:
+    t = np.arange(40.0)
+    t[5], t[9], y = t[4], np.nan, np.arange(40.0)
+    y[7] = np.inf
+    kept = lpm.usable(Channel(t, y), "x")
+    assert kept.y.tolist() == [k for k in range(40) if k not in (5, 7, 9)]
+    lpm.usable(Channel(np.arange(32.0), y[:7].repeat(5)[:32]), "x")
+    with pytest.raises(IdentificationError, match="31 usable samples"):
+        lpm.usable(Channel(np.arange(31.0), np.zeros(31)), "x")
+
+
+def test_a_channel_beside_the_command_is_shifted_as_little_as_possible() -> None:
+    t = H * np.arange(400)
+    u, late = RNG.standard_normal(400), 0.3 * H
+    record = Record({"command": Channel(t, u), "ft": Channel(t[20:] + late, np.arange(380.0))})
+    found = lpm.align(record, "ft")
+    assert (found.start, found.delay, found.period) == pytest.approx((20 * H, late, H))
+    assert found.command.tolist() == pytest.approx(u[20:].tolist())
+    assert found.output.tolist() == list(range(380)) and found.measured.all()
+    assert found.offsets == pytest.approx([0.3]) and not found.held
+    gone = np.r_[0:100, 110:380]
+    some = Channel(t[20:][gone], np.arange(380.0)[gone])
+    lost = lpm.align(Record({"command": Channel(t, u), "ft": some}), "ft")
+    assert np.flatnonzero(~lost.measured).tolist() == list(range(100, 110))
+    with pytest.raises(IdentificationError, match="overlap for 31 samples"):
+        lpm.align(Record({"command": Channel(t, u), "ft": Channel(t[31] - t[63::-1], u[:64])}), "ft")
