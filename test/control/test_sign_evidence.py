@@ -228,8 +228,18 @@ def test_position_and_velocity_go_one_way(turn, sign_v, words) -> None:
 def test_spring_and_ft_move_alike_between_clamped_ends(way, most, size, words) -> None:
     evidence = SignEvidence(RIG, RATE, PULSE)
     pulse(evidence, 0.0)
-    evidence._restless = 0.0
+    evidence._restless, evidence._strongest = 0.0, 4.0
     evidence.way, evidence.most, evidence._size = way, most, lambda: (size, 0.1)
     assert evidence.wrong_size() == words
+
+
+@pytest.mark.parametrize(("felt", "told"), [(3.49, False), (3.52, True)])  # of 2.5 · 1.2 + 0.1 PULSE
+def test_spring_and_ft_move_no_more_than_the_motor_makes(felt, told) -> None:
+    evidence = SignEvidence(RIG, RATE, PULSE)
+    pulse(evidence, 0.0)
+    evidence._restless, evidence._strongest = 0.0, 1.2
+    evidence.way, evidence.most, evidence._size = felt, 1.2 * felt, lambda: (1.0, 0.1)
+    words = f"ft and K times the gear's angle moved by {felt:.3g} N·m at a motor torque of 1.2"
+    assert evidence.wrong_size() == (words if told else "")
     evidence._clamped = False
     assert evidence.wrong_size() == (words if words.startswith("joint") else "")

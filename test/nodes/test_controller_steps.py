@@ -33,7 +33,8 @@ def made(monkeypatch):
     node._link = SimpleNamespace(encoder=None, reason="link is false")
     node._inputs = SimpleNamespace(unusable=2, hear_desired=lambda anchor: None)
     node._desired = SimpleNamespace(
-        torque=1.5, expired=3, refused=4, age=lambda now: None, take=lambda until: calls.append(until) or [],
+        torque=1.5, stamp=1000, expired=3, refused=4, age=lambda now: None,
+        take=lambda until: calls.append(until) or [],
         shift=lambda by: calls.append(("shift", by)), clear=lambda at: calls.append(("clear", at)),
     )  # fmt: skip
     node._anchor = SimpleNamespace(now=lambda: now[0], values=lambda: {"clock": "fine"}, follow=lambda: None)
@@ -44,7 +45,7 @@ def made(monkeypatch):
     lateness = SimpleNamespace(trust=0.75, tolerance=SimpleNamespace(late=0.5), take=lambda late, n: 0.9)
     node._limits = SimpleNamespace(
         lateness=lateness, clear=lambda: calls.append("limits"), idle=lambda sent, made: False,
-        falsified=lambda *a: "", fault=lambda ft, desired: "",
+        falsified=lambda *a: "", fault=lambda ft, desired: "", contradiction="",
     )  # fmt: skip
     node._polarity = SimpleNamespace(
         proven=True, contradiction="", start=lambda: calls.append("polarity"), watch=lambda r, m: False,
@@ -59,7 +60,7 @@ def made(monkeypatch):
     node._writer = SimpleNamespace(write=lambda stamp, values: (stamp, *values))
     node._waiter = SimpleNamespace(stop=lambda: calls.append("stop"), is_running=lambda: True)
     node._health = SimpleNamespace(publish=lambda: calls.append("health"))
-    node._last, node._heard, node._watched, node._until, node._torque = 900, now[0], 0, 0, 4.0
+    node._last, node._heard, node._watched, node._lag, node._torque = 900, now[0], 0, 0.0, 4.0
     node._fault, node._told_fault, node._release = "", "", (0, 0.0)
     node._wished, node._held, node._squares, node._told_losses = True, False, [4.0, 16.0], 0
     node._steps = node._missed = node._limited = node._late = node._late_reported = node._restarts = 0
@@ -126,19 +127,26 @@ def test_the_end_is_three_zeros_after_the_last_command(made):
 
 
 @pytest.mark.parametrize(
-    ("taken", "preview", "off"),
-    [([], False, 0.0), ([(1000, 1.0)], False, 0.0), ([(1000 + 4 * MS, 1.0)], False, 0.4),
-     ([(1000 - 4 * MS, 1.0)], False, -0.4), ([(1000 - 9 * MS, 1.0)], False, -0.5),
-     ([(1000 + 20 * MS, 1.0)], True, 0.0), ([(1, 9.0), (1000 + 2 * MS, 1.0)], False, 0.2)],
+    ("stamp", "is_new", "preview", "off"),
+    [(0.0, True, False, 0.0), (0.4, True, False, 0.4), (-0.4, True, False, -0.4),
+     (-0.9, True, False, -0.892), (-2.4, False, False, -2.4), (2.0, True, True, 0.0)],
 )  # fmt: skip
-def test_a_desired_torque_is_the_one_nearest_to_its_sample(made, taken, preview, off):
+def test_a_desired_torque_is_taken_for_its_own_instant(made, stamp, is_new, preview, off):
+    """In samples. Of 0.4 that one came too late for its sample, a fiftieth is taken for the sender's way."""
     node, _, _, calls = made
-    node._values["preview"], node._wished, node._until = preview, False, -9 * PERIOD
-    node._desired.take = lambda until: calls.append(until) or taken
-    assert node._take_desired() == pytest.approx(off)
-    assert calls == [1000 + 5 * MS + (20 * MS if preview else 0)] and node._wished == bool(taken)
-    node._until = 1000 + 50 * MS  # what holds since before is of this sample
-    assert node._take_desired() == 0.0
+    node._values["preview"], node._wished = preview, False
+    node._desired.stamp = 1000 + round(stamp * PERIOD)
+    node._desired.take = lambda until: calls.append(until) or ([(1, 1.0)] if is_new else [])
+    assert node._take_desired() == pytest.approx(off, abs=1e-6)
+    assert calls == [1000 + 5 * MS + (20 * MS if preview else 0)] and node._wished == is_new
+
+
+def test_a_sender_that_is_always_late_means_a_later_sample(made):
+    node, _, _, _ = made
+    node._desired.stamp, node._desired.take = 1000 - 15 * MS, lambda until: [(1, 1.0)]
+    for _ in range(300):
+        off = node._take_desired()
+    assert off == pytest.approx(-0.5, abs=0.01)
 
 
 def test_a_command_is_counted_published_and_remembered(made):
@@ -217,6 +225,9 @@ def test_the_report_has_the_state_and_its_warnings(made):
         "desired_watchdog_trips": 3, "refused_desired": 4,
     }  # fmt: skip
     assert node._report().values["error_rms"] == "none"
+    node._limits.contradiction = "ft 10, K times deflection 15.8 N·m contradict each other"
+    assert node._report()[:2] == (WARN, node._limits.contradiction)
+    node._limits.contradiction = ""
     node._late = 5
     assert node._report()[:2] == (WARN, "5 commands more than a sample late, with less feedback")
     assert node._report().level == OK
