@@ -5,6 +5,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 
+import numpy as np
+
 from rsea_ros.diagnosis.candidate import (
     Candidate,
     FitSetup,
@@ -29,9 +31,10 @@ from rsea_ros.diagnosis.step_fits import ScreenedEffect, screen
 from rsea_ros.effects.catalogue import effect_named, look_alikes
 from rsea_ros.effects.effect import Effect
 from rsea_ros.effects.guess import Guess
+from rsea_ros.identification.fit import add_effect
 from rsea_ros.identification.problem import Problem
-from rsea_ros.identification.solver import Pools
-from rsea_ros.identification.unknowns import apply
+from rsea_ros.identification.solver import Pools, Solution, jacobian_columns
+from rsea_ros.identification.unknowns import apply, bounds_of, start_vector
 from rsea_ros.model.rig import FIELDS
 from rsea_ros.records.record import FloatArray
 
@@ -119,6 +122,8 @@ class ReducedModels:
             rig, _ = apply(rest.problem.rig, rest.problem.unknowns, solution.theta)
             guesses = initial_guesses(rival, RecordView(model.cases[0], rig, rest.outputs[0]))
         guesses += [{**rival.typical, **same}] if old.unit == rival.main.unit else []
+        can_be_nothing = math.isfinite(old.null) and not old.logarithmic
+        guesses += [in_exchange(model.solution, name, rival)] if can_be_nothing else []
         screened = screen(solution, rival, guesses, self.settings.forward)
         if screened is None or not (is_listed(rival, name) or self._is_close(screened, model)):
             return None
@@ -142,6 +147,31 @@ class ReducedModels:
 
     def _is_far(self, model: Candidate) -> bool:
         return is_far_from_floor(model, self.settings)
+
+
+def in_exchange(solution: Solution, name: str, rival: Effect) -> Guess:
+    """Return where an effect stands in for a cause of a solution, to first order.
+
+    The cause is nothing there, and along the derivatives all other unknowns make the best of it with the
+    rival: between two scales of the torque inertia, damping and stiffness change with them.
+    """
+    main, cause = rival.main, effect_named(name).main
+    start = {**rival.typical, main.name: main.null if math.isfinite(main.null) else main.typical}
+    problem, theta = add_effect(solution.problem, solution.theta, rival, start)
+    residual, new = problem.residual(theta), range(len(solution.theta), len(theta))
+    matrix = np.column_stack([solution.jacobian, jacobian_columns(problem, theta, residual, new)])
+    unknowns, own = problem.unknowns, f"{name}."
+    at = next(k for k, u in enumerate(unknowns) if u.name == own + cause.name)
+    free = [k for k, u in enumerate(unknowns) if not u.name.startswith(own)]
+    left = residual + matrix[:, at] * (unknowns[at].inner(cause.null) - theta[at])
+    weight = np.array([1.0 / unknowns[k].doubt for k in free])
+    off, others = (theta - start_vector(unknowns))[free], matrix[:, free]
+    normal = others.T @ others + np.diag(weight**2)
+    step = np.linalg.lstsq(normal, -(others.T @ left + weight**2 * off), rcond=None)[0]
+    low, high = (bound[free] for bound in bounds_of(unknowns))
+    ends = np.clip(theta[free] + step, low, high).tolist()
+    moved = {unknowns[k].name: unknowns[k].outer(t) for k, t in zip(free, ends, strict=True)}
+    return {n.removeprefix(f"{rival.name}."): value for n, value in moved.items()}
 
 
 def is_listed(effect: Effect, name: str) -> bool:

@@ -158,6 +158,7 @@ def test_a_long_test_leaves_room_for_the_shorter_ones_behind_it(monkeypatch):
     seconds, width = {near: 60.0, long: 31.0, short: 29.0}, {near: 1, long: 1, short: 2}
     known = callers.Calls({("laws/source", "f"): {near, long, short}}, seconds, width)
     monkeypatch.setattr(callers, "calls", lambda: known)
+    monkeypatch.setattr(callers, "_imports", lambda unit, target: False)
     assert callers.tests_of("laws/source", "f") == ([near, short], [])
     seconds[long] = 29.0
     assert callers.tests_of("laws/source", "f") == ([near, long], [])

@@ -31,6 +31,7 @@ class World:
         monkeypatch.setattr(elimination, "apply", lambda rig, unknowns, theta: (rig, None))
         monkeypatch.setattr(elimination, "RecordView", lambda case, rig, outputs: (case, rig, outputs))
         monkeypatch.setattr(elimination, "initial_guesses", lambda effect, view: [{"from": "residual"}])
+        monkeypatch.setattr(elimination, "in_exchange", lambda solution, name, rival: {"instead of": name})
         monkeypatch.setattr(elimination, "screen", self.screen)
 
     def screen(self, solution, rival, guesses, rule):
@@ -223,9 +224,10 @@ def test_a_rival_begins_with_the_size_of_the_cause_where_that_is_one(world, caus
     begun = scripted.guesses[rival]
     assert begun[0] == {"from": "residual"}
     if typical is None:
-        assert len(begun) == 1
+        assert begun[1:] == [], "of an angle without end there is no size to take over"
     else:
-        assert begun[1:] == [{**effect_named(rival).typical, effect_named(rival).main.name: 0.75}]
+        same = {**effect_named(rival).typical, effect_named(rival).main.name: 0.75}
+        assert begun[1:] == [same, {"instead of": cause}]
 
 
 def test_a_rival_begins_where_the_latest_of_its_trials_ended(world):
@@ -238,7 +240,7 @@ def test_a_rival_begins_where_the_latest_of_its_trials_ended(world):
         trials.append(trial_of(tried, FRICTION, scripted.fits.candidate(), "explains_less"))
     scripted.models.with_rivals(scripted.fits.candidate(STRIBECK), trials)
     assert set(scripted.guesses[FRICTION][0].values()) == {0.5}
-    assert len(scripted.guesses[FRICTION]) == 2, "beside it only the size of the cause"
+    assert len(scripted.guesses[FRICTION]) == 3, "beside it the size of the cause, and the exchange"
 
 
 @pytest.mark.parametrize(("is_full", "causes"), [(True, (DELAY,)), (False, (STRIBECK,))])
