@@ -237,5 +237,6 @@ class BagWriter:
 
     def _error(self, error: OSError) -> BagError:
         kept = f"; what was written until then is in {self.partial}" if self._recording else ""
-        is_told, why = isinstance(error, OutputError), error.strerror or error
-        return BagError(f"{error if is_told else f'{self.path}: cannot be written: {why}'}{kept}")
+        if isinstance(error, OutputError):
+            return BagError(f"{error}{kept}")
+        return BagError(f"{self.path}: cannot be written: {error.strerror or error}{kept}")

@@ -93,6 +93,11 @@ class Measurement:
     ft_age: float = 0.0
     link: float = math.nan
 
+    @property
+    def is_whole(self) -> bool:
+        """Whether ft and motion were measured: what no actuator has is no measurement."""
+        return all(is_measured(value, HUGE) for value in (self.ft, self.velocity, self.position))
+
 
 @dataclass(frozen=True)
 class Share:

@@ -36,8 +36,7 @@ SMOOTH = 40.0
 SAME = 1e-3
 """Samples: desired torques nearer than this are one."""
 COASTED = 3.0
-"""Samples in which the course of a desired torque that is not renewed comes to rest: one that stops leads
-nowhere."""
+"""Samples in which the course of a desired torque that is not renewed comes to rest."""
 FADE = 0.2
 """Part by which a sample replaces the mean square of those before."""
 
@@ -53,9 +52,9 @@ class Prediction:
     def start(self, torque: float) -> None:
         """Begin at rest at a torque, N m."""
         self._state: FloatArray = np.array([torque, 0.0, 0.0])
-        self._smooth, self._off = [torque, torque], 0.0
+        self._smooth, self._off = np.full(2, torque), 0.0
         self._last, self._surprise, self._change, self.trust = torque, 0.0, 0.0, 1.0
-        self._promised, self._rest = torque, (0.0, 0.0)
+        self._promised, self._rest = torque, np.zeros(2)
 
     def expected(self, samples: int) -> float:
         """Return the torque, N m, that is expected a number of samples after the last one."""
@@ -96,27 +95,26 @@ class Prediction:
 
         A surprise after a pause is otherwise a jump.
         """
-        jump = part * (self._promised - along[0] - self._rest[1])
-        first, second = self._rest[0] + jump, self._rest[1] + jump
-        for k in range(len(along)):
-            along[k] += second
-            first -= self._soft * first
-            second += self._soft * (first - second)
-            if k == 0:
-                self._rest = first, second
+        rest = self._rest + part * (self._promised - along[0] - self._rest[1])
+        passed = self._passed(rest, 0.0, len(along))
+        self._rest = passed[0]
+        along += np.append(rest[1], passed[:-1, 1])
         self._promised = float(along[1])
         return along
 
     def _low_pass(self, desired: float, samples: int) -> FloatArray:
         """Return the low pass of the desired torque at this sample, and its course from there on."""
-        first, second = self._smooth
-        path = np.empty(samples)
+        passed = self._passed(self._smooth, desired, samples)
+        self._smooth = passed[0]
+        return passed[:, 1]
+
+    def _passed(self, state: FloatArray, towards: float, samples: int) -> FloatArray:
+        """Return both stages of the low pass in the samples to come of a constant input, (samples, 2)."""
+        path, (first, second) = np.empty((samples, 2)), state.tolist()
         for k in range(samples):
-            first += self._soft * (desired - first)
+            first += self._soft * (towards - first)
             second += self._soft * (first - second)
-            path[k] = second
-            if k == 0:
-                self._smooth = [first, second]
+            path[k] = first, second
         return path
 
     def _trust(self, surprise: float, desired: float) -> None:
@@ -135,8 +133,8 @@ def course(interval: float) -> FloatArray:
 def gains_of(memory: float, interval: float = 1.0) -> FloatArray:
     """Return g for a memory over an interval (samples), from 0 (the last three values) to below 1."""
     fresh = 1.0 - memory
-    gains = np.array([1.0 - memory**3, 1.5 * fresh**2 * (1.0 + memory), fresh**3])
-    return np.asarray(gains / [1.0, interval, interval**2])
+    rate, second = 1.5 * fresh**2 * (1.0 + memory) / interval, fresh**3 / interval**2
+    return np.array([1.0 - memory**3, rate, second])
 
 
 MEMORY = 0.5

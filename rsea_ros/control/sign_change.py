@@ -13,7 +13,6 @@ import math
 from rsea_ros.control.controller import Measurement
 from rsea_ros.control.spring_encoder import spread
 from rsea_ros.model.rig import END_NAMES, Rig
-from rsea_ros.records.record import HUGE, is_measured
 
 SURE = 8.0
 CYCLES, LOST = 2, 12
@@ -53,7 +52,7 @@ class SignChange:
         rest: N m, the momentum that nothing explains, None where it is not known. missed: samples lost.
         """
         self._since += 1 + missed
-        if not all(is_measured(value, HUGE) for value in (r.ft, r.position, r.velocity)):
+        if not r.is_whole:
             return ""
         if self._before is None:
             return self._follow(r, rest)

@@ -100,7 +100,7 @@ class SignEvidence:
         sent: N m, the motor torque where it is not measured. missed: samples that were lost before. keep:
         whether it joins the fit.
         """
-        if not all(is_measured(value, HUGE) for value in (r.ft, r.velocity, r.position)):
+        if not r.is_whole:
             return None
         before, self._before = self._before, r
         made = r.motor_torque if is_measured(r.motor_torque, HUGE) else sent

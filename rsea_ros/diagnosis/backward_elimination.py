@@ -33,8 +33,8 @@ from rsea_ros.effects.effect import Effect
 from rsea_ros.effects.guess import Guess
 from rsea_ros.identification.fit import add_effect
 from rsea_ros.identification.problem import Problem
-from rsea_ros.identification.solver import Pools, Solution, jacobian_columns
-from rsea_ros.identification.unknowns import apply, bounds_of, start_vector
+from rsea_ros.identification.solver import Pools, Solution, bounded_step, jacobian_columns
+from rsea_ros.identification.unknowns import apply, start_vector
 from rsea_ros.model.rig import FIELDS
 from rsea_ros.records.record import FloatArray
 
@@ -160,17 +160,14 @@ def in_exchange(solution: Solution, name: str, rival: Effect) -> Guess:
     problem, theta = add_effect(solution.problem, solution.theta, rival, start)
     residual, new = problem.residual(theta), range(len(solution.theta), len(theta))
     matrix = np.column_stack([solution.jacobian, jacobian_columns(problem, theta, residual, new)])
-    unknowns, own = problem.unknowns, f"{name}."
-    at = next(k for k, u in enumerate(unknowns) if u.name == own + cause.name)
-    free = [k for k, u in enumerate(unknowns) if not u.name.startswith(own)]
-    left = residual + matrix[:, at] * (unknowns[at].inner(cause.null) - theta[at])
-    weight = np.array([1.0 / unknowns[k].doubt for k in free])
-    off, others = (theta - start_vector(unknowns))[free], matrix[:, free]
-    normal = others.T @ others + np.diag(weight**2)
-    step = np.linalg.lstsq(normal, -(others.T @ left + weight**2 * off), rcond=None)[0]
-    low, high = (bound[free] for bound in bounds_of(unknowns))
-    ends = np.clip(theta[free] + step, low, high).tolist()
-    moved = {unknowns[k].name: unknowns[k].outer(t) for k, t in zip(free, ends, strict=True)}
+    names, own = [u.name for u in problem.unknowns], f"{name}."
+    at, free = names.index(own + cause.name), [k for k, n in enumerate(names) if not n.startswith(own)]
+    left = residual + matrix[:, at] * (problem.unknowns[at].inner(cause.null) - theta[at])
+    rest, begin = without_effect(problem, theta, name)
+    weight, others = np.array([u.doubt for u in rest.unknowns]) ** -2.0, matrix[:, free]
+    slope = others.T @ left + weight * (begin - start_vector(rest.unknowns))
+    end = bounded_step(rest, begin, others.T @ others + np.diag(weight), slope)
+    moved = {u.name: u.outer(t) for u, t in zip(rest.unknowns, end.tolist(), strict=True)}
     return {n.removeprefix(f"{rival.name}."): value for n, value in moved.items()}
 
 
