@@ -106,7 +106,7 @@ class Prediction:
         """Return the low pass of the desired torque at this sample, and its course from there on."""
         passed = self._passed(self._smooth, desired, samples)
         self._smooth = passed[0]
-        return passed[:, 1]
+        return np.array(passed[:, 1])
 
     def _passed(self, state: FloatArray, towards: float, samples: int) -> FloatArray:
         """Return both stages of the low pass in the samples to come of a constant input, (samples, 2)."""

@@ -110,6 +110,23 @@ def test_a_desired_torque_that_is_not_renewed_comes_to_rest_near_its_last_value(
     assert path[-1] == pytest.approx(path[-10], abs=1e-3)
 
 
+def test_what_is_done_with_a_course_does_not_reach_back_into_its_low_pass():
+    """The state was a view into the course: the bandwidth of a sine went from 26 to 31 Hz."""
+    calm, disturbed = Prediction(80.0, 1.0 / RATE), Prediction(80.0, 1.0 / RATE)
+    for k in range(30):
+        wish = math.sin(0.6 * k)
+        calm.ahead(wish, 2)
+        disturbed.ahead(wish, 2)[:] = 99.0
+    assert calm.ahead(1.0, 2) == pytest.approx(disturbed.ahead(1.0, 2))
+    first = second = 0.0
+    smooth, soft = Prediction(80.0, 1.0 / RATE), 1.0 - math.exp(-2.0 * math.pi * 40.0 / RATE)
+    for k in range(30):
+        smooth.ahead(math.sin(0.6 * k), 2)
+        first += soft * (math.sin(0.6 * k) - first)
+        second += soft * (first - second)
+    assert smooth._smooth == pytest.approx([first, second])
+
+
 def test_a_jump_is_not_extrapolated():
     prediction = Prediction(80.0, 1.0 / RATE)
     jump = [prediction.ahead(0.0 if k < 5 else 1.0, 1)[0] for k in range(60)]
