@@ -31,16 +31,12 @@ def bag(tmp_path_factory):
 
 def test_replay_keeps_stamps_and_gives_identify_everything(bag, start, listener, tmp_path):
     clock = listener.hear(Clock, "/clock", COMMAND)
-    states, *_ = (
-        listener.hear(kind, topic, RECORD_RELIABLE)
-        for topic, kind in (
-            ("/rsea/joint_states", JointState),
-            ("/rsea/torque_command", JointState),
-            ("/rsea/ft", WrenchStamped),
-        )
-    )
+    states = listener.hear(JointState, "/rsea/joint_states", RECORD_RELIABLE)
+    listener.hear(JointState, "/rsea/torque_command", RECORD_RELIABLE)
     identify = start("identify", rig=RIG, out=tmp_path, reliable=True)
     replay = start("replay", bag=bag, rate=10.0, subscribers=2)
+    listener.until(lambda: listener.node.count_publishers("/clock"))  # of which nobody sends ticks again
+    listener.hear(WrenchStamped, "/rsea/ft", RECORD_RELIABLE)  # the last that it waits for
     epoch = read_record(bag).epoch_ns
     expected = epoch + np.rint(read_record(bag)["position"].t * 1e9).astype(np.int64)
     listener.until(lambda: not replay.is_running() and len(states) >= len(expected))
