@@ -12,7 +12,7 @@ from msg_adapters.decoding import DIAGNOSTICS, Decoded, is_inferred, tell_health
 from msg_adapters.topic_map import FIELDS, READ, ROLES, TYPES, TopicMap, sign_and_index
 from rsea_ros.documents.wording import brief, did_you_mean, list_names
 from rsea_ros.errors import BagError
-from rsea_ros.records.record import IMPORTED, Channel, Fault, FloatArray, IntArray, Record
+from rsea_ros.records.record import COMMANDS, IMPORTED, Channel, Fault, FloatArray, IntArray, Record
 from rsea_ros.records.stamp_order import far_apart, in_order, stray_fault
 from rsea_ros.records.stamps import repair_stamps
 
@@ -105,7 +105,7 @@ def record_from(contents: Contents, source: str, topics: TopicMap, *, strict: bo
             series.update(_series(source, role, messages, topics, report))
     if strict:
         for name, one in series.items():
-            if name in ("command", "reference"):
+            if name in COMMANDS:
                 _check_finite(one)
             if repeats := len(one.stamps) - len(np.unique(one.stamps)):
                 repeated = f"{repeats} of {len(one.stamps)} stamps repeat"
@@ -178,7 +178,7 @@ def _require_values(
     """Refuse messages whose arrays are empty where values are needed, and measurements of another clock."""
     if strict and "command" not in series and "reference" not in series:
         raise BagError(f"{source}: the command's messages hold no effort, expected the torque in N·m")
-    if not set(series) - ({"command", "reference"} if strict else set()):
+    if not set(series) - ({*COMMANDS} if strict else set()):
         raise BagError(
             f"{source}: no measurement is left{report.remarks()}, expected joint states or F/T with values, "
             "stamped by the command's clock"
@@ -257,6 +257,8 @@ def _column(block: Block, field: str, topics: TopicMap, element: int) -> FloatAr
     if topics.joint is not None and names and topics.joint not in names:
         return None
     if block.layout.fields.keys() == {VALUES}:
+        if field == "velocity":  # a number alone is the position of its role
+            return None
         field = VALUES
     elif field not in block.layout.fields:  # of a DynamicJointState
         field = f"{topics.joint or names[0]}/{field}" if names else field

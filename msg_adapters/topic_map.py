@@ -26,7 +26,7 @@ FIELDS: Mapping[str, Mapping[str, str]] = {
     "joint_states": {"position": "position", "velocity": "velocity", "motor_torque": "effort"},
     "ft": {"ft": "wrench"},
     "deflection": {"deflection": "position"},
-    "desired_position": {"reference": "position"},
+    "desired_position": {"reference": "position", "reference_velocity": "velocity"},
 }
 """By role: the channels of the record, and the field of the message that each comes from."""
 
@@ -65,8 +65,9 @@ class TopicMap:
 
     A name that starts with a slash is absolute, any other lies in the namespace.
     desired_position is a JointState whose position is the reference of the controller that ran during
-    the record. It is named like its sibling `desired_torque`, after the requested quantity: `reference` names
-    neither quantity nor unit, and in ROS often means a reference frame.
+    the record, and whose velocity is the target velocity of a MIT frame. It is named like its sibling
+    `desired_torque`, after the requested quantity: `reference` names neither quantity nor unit, and in ROS
+    often means a reference frame.
 
     deflection is a JointState whose position is the angle of the spring by its own encoder.
 

@@ -134,6 +134,7 @@ CHANNELS: Mapping[str, str] = {
     "position": "angle",
     "velocity": "angular velocity",
     "reference": "angle",
+    "reference_velocity": "angular velocity",
 }
 """By channel of a record: its dimension."""
 

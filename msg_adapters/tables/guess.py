@@ -22,10 +22,12 @@ from rsea_ros.errors import ImportMapError
 from rsea_ros.records.record import FloatArray
 
 _ANGLE = r"pos|angle|theta|phi|encoder|ticks|_q\d*_"
+_RATE = r"vel|speed|_dq\d*_|_qd\d*_"
 _WISHED = "target|goal|des_|desired|ref|cmd|command|setpoint"
 _WORDS: Mapping[str, str] = {
+    "reference_velocity": f"({_WISHED}).*({_RATE})|({_RATE}).*({_WISHED}|_d_)",
     "reference": f"({_WISHED}).*({_ANGLE})|({_ANGLE}).*({_WISHED}|_d_)",
-    "command": f"^_u_$|{_WISHED}|_[dc]_$",
+    "command": f"^_u_$|{_WISHED}|_[dc]_$|feed_?forward|_ff_",
     "deflection": "defl|spring|twist|delta",
     "ft": "^_ft|^_[tmf][xyz]|load_?cell|wrench|(sensor|output).*(torq|force)|(torq|force).*(sensor|output)",
     "velocity": r"^_[wv]_|_dq\d*_|_qd|vel|omega|speed|rpm|_rate_",

@@ -18,7 +18,7 @@ from rsea_ros.documents.strict_yaml import is_decimal
 from rsea_ros.documents.units import in_motion, plain
 from rsea_ros.documents.wording import list_names, quote
 from rsea_ros.errors import ImportMapError
-from rsea_ros.records.record import IMPORTED, UNITS, BoolArray, Channel, Fault, FloatArray, Record
+from rsea_ros.records.record import COMMANDS, IMPORTED, UNITS, BoolArray, Channel, Fault, FloatArray, Record
 from rsea_ros.records.stamps import even_behind_ticks
 
 SET_POINTS = (
@@ -205,7 +205,7 @@ def _record(path: str | Path, parts: Sequence[_Part], mapping: ImportMap) -> Rec
     lines = [f"{fault.channel}: {fault.detail}" for fault in faults]
     if mapping.set_points:
         lines += [SET_POINTS, *static_lines(Record(channels))]
-        channels = {name: held for name, held in channels.items() if name not in ("command", "reference")}
+        channels = {name: held for name, held in channels.items() if name not in COMMANDS}
     notes = (
         f"{IMPORTED}{Path(path).name}, {mapping.path.name}: {mapping.about}".rstrip(": "),
         *(note for part in parts for note in part.notes),

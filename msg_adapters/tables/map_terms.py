@@ -71,6 +71,7 @@ _MEANINGS = {
     "position": "angle of the gear output relative to the housing",
     "velocity": "rate of `position`",
     "reference": "target position of a controller that was active during the record",
+    "reference_velocity": "target velocity of a MIT frame",
 }
 CHANNEL = tuple(Key(name, dimension, "not measured", _MEANINGS[name]) for name, dimension in CHANNELS.items())
 SECTIONS: Mapping[str, Sequence[Key]] = {

@@ -13,7 +13,7 @@ from rsea_ros.documents.wording import list_names
 from rsea_ros.errors import IdentificationError
 from rsea_ros.model.extent import check_pace
 from rsea_ros.model.rig import Rig
-from rsea_ros.records.record import FAULT_KINDS, UNITS, Channel, Record
+from rsea_ros.records.record import COMMANDS, FAULT_KINDS, UNITS, Channel, Record
 from rsea_ros.records.stamps import repair_stamps
 
 _FEWEST = 0.1
@@ -43,7 +43,7 @@ def check_diagnosable(record: Record) -> None:
         raise IdentificationError(
             f"{record.source}: {length:.3g} s of commands, expected {SHORTEST:g} s or more"
         )
-    measured = [c for n, c in record.channels.items() if n not in ("command", "reference")]
+    measured = [c for n, c in record.channels.items() if n not in COMMANDS]
     if not measured:
         left_out = "; ".join(f"{f.channel}: {FAULT_KINDS[f.kind]}" for f in record.faults)
         reason = f" ({left_out})" if left_out else ""
@@ -111,7 +111,7 @@ def with_faults(record: Record, findings: Findings, *, masks: bool) -> Record:
     """
     dead = {f.channel for f in findings.faults if f.kind == "dead_channel"}
     channels = {n: c for n, c in record.channels.items() if n not in dead}
-    if not set(channels) - {"command", "reference"}:
+    if not set(channels) - {*COMMANDS}:
         raise IdentificationError(
             f"{record.source}: no sensor answers to the machine ({_reasons(record, findings)}), expected one "
             "that does: rsea check shows each"
@@ -130,9 +130,8 @@ def _without_late(record: Record, findings: Findings) -> Record:
     A lag of part of a record, or of 50 ms and more, is no effect of a bench: a torque constant of 0.245
     stood in for one that grew. Where nothing else is measured they stay.
     """
-    commands = {"command", "reference"}
-    late = {f.channel for f in findings.of("clock_offset") if f.light == "red"} - commands
-    if not record.channels.keys() - late - commands:
+    late = {f.channel for f in findings.of("clock_offset") if f.light == "red"} - {*COMMANDS}
+    if not record.channels.keys() - late - {*COMMANDS}:
         return record
     faults = tuple(
         replace(f, detail=f"left out, {f.detail}") if f.kind == "clock_offset" and f.channel in late else f
@@ -159,7 +158,7 @@ def _sound(record: Record, findings: Findings) -> Record:
     """Return the record without the samples that must not count; commands stay, and what a fit refuses."""
     sound = {}
     for name, channel in record.channels.items():
-        if name in ("command", "reference"):
+        if name in COMMANDS:
             continue
         bad, masked = ~np.isfinite(channel.y), findings.masked.get(name)
         bad = bad | masked if masked is not None and len(masked) == len(bad) else bad

@@ -54,9 +54,10 @@ def check_record(
     with one_blas_thread(), np.errstate(all="ignore"):
         if rig.loop is not None and "reference" not in record:
             return Findings(record.source, rig.name, (_no_targets(record),), record.faults)
+        have = "; ".join(filter(None, (", ".join(record.channels), unused_sentence(record, rig))))
         record = bound_values(record if rig.loop is None else with_command(record, rig))
         checked = check(record, rig)
-        every = [*_topics(record, rig), *(fault_finding(f) for f in checked.faults)]
+        every = [*_topics(record, have), *(fault_finding(f) for f in checked.faults)]
         moving = "command" in checked.record and len(checked.record["command"]) > 2
         top = command_band(checked.record["command"])[1] if moving else math.inf
         every += [*order(record), *rates(record, rig, top)]
@@ -95,9 +96,7 @@ def _of_targets(f: Finding) -> Finding:
     return replace(f, channel="reference", unit=unit, detail=detail)
 
 
-def _topics(record: Record, rig: Rig) -> Iterator[Finding]:
-    have = ", ".join(record.channels)
-    have = "; ".join(filter(None, (have, unused_sentence(record, rig))))
+def _topics(record: Record, have: str) -> Iterator[Finding]:
     if "command" in record:
         yield Finding("green", "topics", "", float(len(record.channels)), "1", detail=have)
         return

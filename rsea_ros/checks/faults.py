@@ -23,7 +23,7 @@ from rsea_ros.identification.noise import FEW, step_of
 from rsea_ros.model.extent import is_too_fast
 from rsea_ros.model.rig import Rig
 from rsea_ros.records.holds import repeats_of
-from rsea_ros.records.record import MEASURED, BoolArray, Channel, Fault, FloatArray, Record
+from rsea_ros.records.record import COMMANDS, MEASURED, BoolArray, Channel, Fault, FloatArray, Record
 from rsea_ros.records.stamps import repair_stamps
 
 _VISIBLE = 3.0
@@ -116,7 +116,7 @@ class Checked:
 
 def check(record: Record, rig: Rig) -> Checked:
     """Find and mask the faults of a record; a channel of one sample, or without a good one, is missing."""
-    few = {n: 1 if n in ("command", "reference") else 2 for n in record.channels}
+    few = {n: 1 if n in COMMANDS else 2 for n in record.channels}
     record = _without(record, {n for n, c in record.channels.items() if len(c) < few[n]})
     faults = [*record.faults, *(Fault("missing_topic", n, 1.0) for n in rig.sensors if n not in record)]
     repaired, clock_faults = repair_stamps(record)
@@ -231,7 +231,7 @@ def clipping(channel: Channel, name: str) -> BoolArray:
     Of a log that repeats each value, the values count. A motion that slows down to the extreme value rests.
     """
     bad = np.zeros(len(channel), bool)
-    if name in ("command", "reference", "motor_torque") or not np.isfinite(channel.y).any():
+    if name in (*COMMANDS, "motor_torque") or not np.isfinite(channel.y).any():
         return bad
     arrived = channel.y[:: repeats_of(channel.y)]
     for extreme in (np.nanmax(channel.y), np.nanmin(channel.y)):

@@ -9,7 +9,7 @@ from rsea_ros.checks.pairs import Pair
 from rsea_ros.model.inverse import is_inverse
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import RigChoice
-from rsea_ros.records.record import BoolArray, Fault, Record
+from rsea_ros.records.record import COMMANDS, BoolArray, Fault, Record
 
 Light = Literal["green", "amber", "red"]
 LIGHTS: tuple[Light, ...] = ("green", "amber", "red")
@@ -74,11 +74,15 @@ def worst(lights: Sequence[Light]) -> Light:
 def unused_sentence(record: Record, rig: Rig) -> str:
     """Return which channels a fit does not use and why, empty where it uses all.
 
-    A drive without a spring is judged by its torque.
+    A drive without a spring is judged by its torque; only a MIT frame has a torque beside its targets.
     """
     beside = {"velocity"} if is_inverse(rig) else set()
     unused = ", ".join(n for n in record.channels if not rig.measures(n) or n in beside)
-    return f"a rig without a spring makes no use of {unused}" if unused else ""
+    said = [f"a rig without a spring makes no use of {unused}"] if unused else []
+    targets = [n for n in COMMANDS if n in record and n != "reference"]
+    if targets and rig.loop not in (None, "mit") and "reference" in record:
+        said.append(f"a {rig.loop} loop makes no use of {', '.join(targets)} beside reference; `mit` does")
+    return "; ".join(said)
 
 
 _IN_A_MAP = (

@@ -12,7 +12,7 @@ from rsea_ros.checks.expected import (
     witness_of,
 )
 from rsea_ros.identification.noise import step_of
-from rsea_ros.records.record import MEASURED, BoolArray, Channel, FloatArray, Record
+from rsea_ros.records.record import COMMANDS, MEASURED, BoolArray, Channel, FloatArray, Record
 from rsea_ros.records.statistics import running_integral, runs_of
 
 SMALLEST_SHARE = 1e-3
@@ -59,7 +59,7 @@ def frozen_samples(channel: Channel, name: str) -> BoolArray:
     all but long runs. A sensor that repeats every other sample or more is slower than the log,
     which is no fault; but a few runs far longer than all others are.
     """
-    if name in ("command", "reference"):
+    if name in COMMANDS:
         return np.zeros(len(channel), bool)
     step = np.diff(channel.y, prepend=np.nan)
     repeat: BoolArray = step == 0.0

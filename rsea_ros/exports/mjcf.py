@@ -213,7 +213,7 @@ def say_loop(rig: Rig, root: xml.Element) -> tuple[dict[str, str], dict[str, str
     if rig.loop is None:
         return {"motor": "motor on the tendon output - housing"}, {}
     k_p, k_d = others.pd_gains(rig)
-    named = {"kp": k_p, "ki": rig["controller.k_i"] if rig.loop == "pd" else 0.0, "kv": k_d}
+    named = {"kp": k_p, "ki": rig["controller.k_i"], "kv": k_d}
     gains = {name: value for name, value in named.items() if value}
     first = motor(root)
     first.tag = "pid"

@@ -56,7 +56,7 @@ def finite_sizes(rig: Rig) -> dict[str, dict[str, float]]:
 
 def pd_gains(rig: Rig) -> tuple[float, float]:
     """Return the gains of a rig's loop on position, N m/rad, and on speed, N m s/rad."""
-    if rig.loop == "pd":
+    if rig.loop != "cascade":
         return rig["controller.k_p"], rig["controller.k_d"]
     return rig["controller.k_pos"] * rig["controller.k_v"], rig["controller.k_v"]
 

@@ -30,7 +30,7 @@ from rsea_ros.model.extent import bound_values, check_pace
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_document import rig_from_document
 from rsea_ros.model.rig_file import rig_text
-from rsea_ros.records.record import UNITS, Fault, Record
+from rsea_ros.records.record import COMMANDS, UNITS, Fault, Record
 from rsea_ros.report import result_files
 from rsea_ros.report.identification import identification_json
 
@@ -110,7 +110,7 @@ def analyse(row: Row, path: Path, url: str, joint: MappedJoint, *, page: bool = 
 def _fit_for_fit(run: JointRecording, rig: Rig) -> Record:
     """Return the run without the samples that the checks mask."""
     checked = check(bound_values(run.lenient), rig)
-    measured = [n for n in checked.record.channels if n not in ("command", "reference")]
+    measured = [n for n in checked.record.channels if n not in COMMANDS]
     if not any(checked.masked[n].any() for n in measured if n in checked.masked):
         return run.strict()
     kept = {n: c if n not in measured else replace(c, t=c.t[~checked.masked[n]], y=c.y[~checked.masked[n]])
@@ -160,7 +160,7 @@ def _cause(cause: Any) -> dict[str, Any]:
 def excitation(record: Record) -> list[dict[str, Any]]:
     """Return the excitation of the run: size and band of the command, and the travel of the output."""
     figures: list[tuple[str, float, str]] = []
-    name = next((n for n in ("command", "reference") if n in record), "")
+    name = next((n for n in COMMANDS if n in record), "")
     if name:
         y = record[name].y[np.isfinite(record[name].y)]
         if len(y):

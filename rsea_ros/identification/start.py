@@ -129,7 +129,7 @@ def _loop_torque(record: Record, rig: Rig, t: FloatArray, q: FloatArray, v: Floa
     """Return the torque that the loop makes along a motion, without its integral."""
     target = smooth(record["command"].held(t), float(t[1] - t[0]))
     _, position, _, velocity, *_ = loop_parameters(rig)
-    if rig.loop == "pd":
+    if rig.loop != "cascade":
         return position * (target - q) - velocity * v
     return velocity * (position * (target - q) - v)
 
@@ -170,7 +170,7 @@ def _torque_of_errors(case: Case, rig: Rig) -> float:
     keep = case.mask["position"]
     error = case.drive.command_at(case.t["position"][keep]) - case.measured["position"][keep]
     _, position, _, velocity, *_ = loop_parameters(rig)
-    gain = position if rig.loop == "pd" else position * velocity
+    gain = position if rig.loop != "cascade" else position * velocity
     return gain * _quantile(error)
 
 

@@ -1,7 +1,11 @@
 """Position loops: of a driver, and of a motor's firmware.
 
-pd        u = k_p e + k_i int e dt - k_d q' + k_f r',   e = r - q; r follows its target within a speed
+p, pd     u = k_p e + k_i int e dt - k_d q' + k_f r',   e = r - q; r follows its target within a speed
+    mit       u = k_p e + k_d (r' - q') + u_f: a damped p loop with the target r + (k_d r' + u_f) / k_p
     cascade   v_r = k_pos e within a limit,   u = k_v (v_r - q') + k_vi int (v_r - q') dt
+
+mit is the frame of CubeMars, Damiao, RobStride, CyberGear, the mini-cheetah and Unitree: target position,
+target velocity (channel reference_velocity) and torque u_f (channel command) in every frame; gains constant.
 
 The firmware uses the mean of the target since its last sample: the instant of a new target in it is unknown,
 and a target that counted only at a sample would make every residual a staircase in the delay.
@@ -11,6 +15,7 @@ Advanced PID Control, 2006, section 3.5).
 """
 
 import math
+from dataclasses import replace
 
 from rsea_ros.effects.effect import compiled
 from rsea_ros.effects.signal_table import (
@@ -24,7 +29,7 @@ from rsea_ros.effects.signal_table import (
 )
 from rsea_ros.errors import ChannelError
 from rsea_ros.model.rig import PositionLoop, Rig
-from rsea_ros.records.record import ComplexArray, Record
+from rsea_ros.records.record import Channel, ComplexArray, Record
 
 
 def loop_parameters(rig: Rig) -> tuple[float, ...]:
@@ -33,7 +38,7 @@ def loop_parameters(rig: Rig) -> tuple[float, ...]:
         c = rig.controller or PositionLoop(0.0, 0.0)
         return CASCADE, c.k_p, 0.0, c.k_v, 0.0, c.limit, math.inf, 0.0
     limits = tuple(rig[f"controller.{name}"] for name in ("torque_limit", "velocity_limit", "sample_time"))
-    if rig.loop == "pd":
+    if rig.loop != "cascade":
         gains = tuple(rig[f"controller.{name}"] for name in ("k_p", "k_i", "k_d", "k_f"))
         return PD, *gains, *limits
     gains = tuple(rig[f"controller.{name}"] for name in ("k_pos", "k_vi", "k_v"))
@@ -59,7 +64,23 @@ def with_command(record: Record, rig: Rig) -> Record:
             f"{record.source}: no target positions (channel reference, topic desired_position) beside "
             f"{have}, expected them: rig {rig.name} is commanded with positions"
         )
+    if rig.loop == "mit" and FRAME not in record.notes:
+        record = _with_one_target(record, rig)
     return record.with_channels(command=record["reference"])
+
+
+FRAME = "the frames' target velocities and torques are in the target positions, over the gain k_p"
+"""The note of a record of MIT frames whose three targets have become one."""
+
+
+def _with_one_target(record: Record, rig: Rig) -> Record:
+    """Return a record of MIT frames with the target positions that ask for the same torque."""
+    target = record["reference"]
+    beside = {"reference_velocity": rig["controller.k_d"], "command": 1.0}
+    more = sum(k * record[n].held(target.t) for n, k in beside.items() if n in record)
+    whole = Channel(target.t, target.y + more / rig["controller.k_p"])
+    channels = {n: c for n, c in record.channels.items() if n not in beside}
+    return replace(record, channels={**channels, "reference": whole}, notes=(*record.notes, FRAME))
 
 
 def close_loop(rig: Rig, plant: ComplexArray, output: ComplexArray, s: ComplexArray) -> ComplexArray:
@@ -69,7 +90,7 @@ def close_loop(rig: Rig, plant: ComplexArray, output: ComplexArray, s: ComplexAr
     of shape (n,). u = F r - B q, so output / r = output F / (1 + plant B).
     """
     _, position, integral, velocity, forward, *_ = loop_parameters(rig)
-    if rig.loop == "pd":
+    if rig.loop != "cascade":
         ahead, back = position + integral / s + forward * s, position + integral / s + velocity * s
     else:
         inner = velocity + integral / s

@@ -42,12 +42,14 @@ _END_FIELDS = {
 }
 
 LOOP_FIELDS: Mapping[str, Mapping[str, Field]] = {
+    "p": {"k_p": Field("N m/rad")},
     "pd": {
         "k_p": Field("N m/rad"),
         "k_i": Field("N m/rad/s", default=0.0),
         "k_d": Field("N m s/rad", default=0.0),
         "k_f": Field("N m s/rad", default=0.0),
     },
+    "mit": {"k_p": Field("N m/rad"), "k_d": Field("N m s/rad", default=0.0)},
     "cascade": {
         "k_pos": Field("1/s"),
         "k_v": Field("N m s/rad"),
@@ -60,7 +62,13 @@ _LIMIT_FIELDS = {
     "velocity_limit": Field("rad/s", low_allowed=False, default=math.inf),
     "sample_time": Field("s", default=0.0),
 }
-LOOP_LIMITS = tuple(_LIMIT_FIELDS)
+
+
+def loop_names(kind: str) -> tuple[str, ...]:
+    """Return the gains and limits that a kind of position loop may have."""
+    limits = (name for name in _LIMIT_FIELDS if kind != "mit" or name != "velocity_limit")
+    return *LOOP_FIELDS[kind], *limits
+
 
 FIELDS: Mapping[str, Field] = {
     "rotor.reflected_inertia": Field("kg m^2", low_allowed=False),
@@ -397,7 +405,7 @@ def _check_loop(rig: Rig) -> None:
             f"rig {rig.name}: controller.kind = {rig.loop!r}, expected one of {', '.join(LOOP_FIELDS)}",
             "controller.kind",
         )
-    allowed = (*LOOP_FIELDS[rig.loop], *LOOP_LIMITS)
+    allowed = loop_names(rig.loop)
     for name in stated:
         if name not in allowed:
             raise RigError(
@@ -406,3 +414,21 @@ def _check_loop(rig: Rig) -> None:
             )
     for name in LOOP_FIELDS[rig.loop]:
         rig[f"controller.{name}"]
+    if rig.loop == "mit":
+        _check_frame(rig)
+
+
+def _check_frame(rig: Rig) -> None:
+    """Raise RigError for a MIT frame without a position loop, and for gains that a fit may change."""
+    if rig["controller.k_p"] == 0.0:
+        raise RigError(
+            f"rig {rig.name}: controller.k_p = 0 in a mit loop, expected > 0 N·m/rad; frames of torques "
+            "alone have no controller: map their torque as `command`, add k_d to rotor.reflected_damping",
+            "controller.k_p",
+        )
+    for name in (n for n in LOOP_FIELDS["mit"] if f"controller.{n}" in rig.free()):
+        where = f"controller.{name}"
+        raise RigError(
+            f"rig {rig.name}: {where} has a spread of {rig.spread(where):g}, expected none: frames say it",
+            where,
+        )

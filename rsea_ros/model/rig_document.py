@@ -33,7 +33,6 @@ from rsea_ros.model.rig import (
     FIELDS,
     HOLDS,
     LOOP_FIELDS,
-    LOOP_LIMITS,
     EffectSetting,
     Field,
     Hold,
@@ -42,6 +41,7 @@ from rsea_ros.model.rig import (
     Rig,
     Sensor,
     check_value,
+    loop_names,
 )
 from rsea_ros.model.train import TRAINS
 from rsea_ros.records.record import MEASURED, UNITS
@@ -169,7 +169,7 @@ def tables() -> str:
 
 def _loop_table(kind: str) -> str:
     """Return the table of a position loop whose targets command the bench."""
-    keys = [(key, FIELDS[f"controller.{key}"]) for key in (*LOOP_FIELDS[kind], *LOOP_LIMITS)]
+    keys = [(key, FIELDS[f"controller.{key}"]) for key in loop_names(kind)]
     rows = [Key(key, *_expectation(field), _LOOP_MEANINGS[key]) for key, field in keys]
     return table(f"controller, kind: {kind}", [LOOP_KIND, *rows])
 
@@ -354,7 +354,7 @@ def _loop(item: Any) -> tuple[str | None, dict[str, Quantity]]:
         raise RigError(
             f"controller.kind = {quote(kind)}, expected one of {', '.join(LOOP_FIELDS)}", "controller.kind"
         )
-    only_keys(item, {"kind", *LOOP_FIELDS[kind], *LOOP_LIMITS}, "controller")
+    only_keys(item, {"kind", *loop_names(kind)}, "controller")
     names_of = (key for key in item if key != "kind")
     return kind, {f"controller.{key}": _quantity(f"controller.{key}", item[key]) for key in names_of}
 

@@ -13,7 +13,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from rsea_ros.records.record import MEASURED, SENSED, BoolArray, Channel, Fault, FloatArray, IntArray, Record
+from rsea_ros.records.record import (
+    COMMANDS,
+    MEASURED,
+    SENSED,
+    BoolArray,
+    Channel,
+    Fault,
+    FloatArray,
+    IntArray,
+    Record,
+)
 
 SHORTEST, PERIODS = 0.1, 10.0
 """s, and sample periods of the fastest channel: a shorter gap leaves the last command a good guess."""
@@ -50,8 +60,6 @@ def _shown_commands(command: Channel, torque: Channel) -> IntArray:
     either = [np.maximum(k, 0) for k in (ended, begun)]
     return np.asarray(min(either, key=lambda k: np.nanmedian(np.abs(torque.y - command.y[k]))), np.int64)
 
-
-COMMANDS = ("command", "reference")
 
 _LONG = 32.0
 """Sample periods of the sensors that a value lasts, at the median: a step, no sample of a signal (a loop at

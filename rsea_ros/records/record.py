@@ -49,6 +49,7 @@ UNITS: Mapping[str, str] = {
     "ft": "N m",
     "deflection": "rad",
     "reference": "rad",
+    "reference_velocity": "rad/s",
 }
 """Channel names and their units.
 
@@ -61,7 +62,11 @@ ft            torque of the F/T sensor about the actuator axis, positive when th
 deflection    angle of the spring from a separate encoder, positive when the spring pushes the distal side
               forward
 reference     target position of a controller that was active during the record
+reference_velocity  target velocity of such a controller
 """
+
+COMMANDS = ("command", "reference", "reference_velocity")
+"""Channels that say what was asked; all others were measured."""
 
 SENSED = ("ft", "deflection", "position", "velocity")
 """Channels that a verdict uses, in the order in which it names them."""
@@ -263,6 +268,8 @@ ALIASES: Mapping[str, str] = {
     "tau_d": "ft",
     "q_ref": "reference",
     "target_position": "reference",
+    "dq_ref": "reference_velocity",
+    "target_velocity": "reference_velocity",
     "q_spring": "deflection",
 }
 """Other names that people give to the channels of signals.UNITS."""

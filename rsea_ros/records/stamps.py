@@ -13,7 +13,7 @@ import numpy as np
 
 from rsea_ros.errors import ChannelError
 from rsea_ros.records import holds, stamp_order
-from rsea_ros.records.record import SENSED, BoolArray, Channel, Fault, FloatArray, Record
+from rsea_ros.records.record import COMMANDS, SENSED, BoolArray, Channel, Fault, FloatArray, Record
 
 _FEWEST = 10
 """Samples of a channel: fewer say little of when it started."""
@@ -184,7 +184,7 @@ def repair_stamps(record: Record) -> tuple[Record, list[Fault]]:
         faults += [*jumps, *disorder, *repeats]
         _check_even(channel, f"{record.source}: {name}")
         ordered = record.with_channels(**{name: channel})
-        pauses = holds.paused_steps(ordered, name) if name in holds.COMMANDS else None
+        pauses = holds.paused_steps(ordered, name) if name in COMMANDS else None
         if not any(fault.kind == "coarse_stamps" for fault in repeats):  # else what looks like a gap is none
             faults += stamp_order.dropped_samples(channel, name, count - len(channel), pauses)
         channels[name] = channel

@@ -9,6 +9,7 @@ CHANNELS = {
     "command": "commanded motor torque", "motor_torque": "motor torque", "position": "position",
     "velocity": "velocity", "ft": "F/T torque", "deflection": "spring deflection",
     "reference": "reference position",
+    "reference_velocity": "reference velocity",
 }  # fmt: skip
 
 PARAMETERS = {

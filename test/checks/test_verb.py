@@ -139,6 +139,12 @@ def test_the_check_and_the_record_of_a_fit_say_it(run):
     assert check_record(run, load_rig("paper_high_impedance")).of("topics")[0].detail.count("no use") == 0
 
 
+def test_a_torque_beside_the_targets_of_a_pd_loop_is_told(run):
+    beside = run.with_channels(reference=run["position"])
+    said = check_record(beside, load_rig("pd_joint")).of("topics")[0].detail
+    assert "a pd loop makes no use of command beside reference" in said
+
+
 def test_identify_says_it_once(run, tmp_path, capsys):
     write_record(run, tmp_path / "bag")
     words = ["identify", str(tmp_path / "bag"), "--rig", "bare_drive", "--out", str(tmp_path / "out")]

@@ -11,7 +11,7 @@ from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.identification.excitation import JOINT, excitation
-from rsea_ros.model.rig import Rig
+from rsea_ros.model.rig import Quantity, Rig
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
 from rsea_ros.records.record import Channel, Record
@@ -39,6 +39,47 @@ def test_friction_and_a_delay_of_the_targets_are_named():
     assert sizes["command_delay"] == pytest.approx(0.015, abs=3e-4)
     assert diagnosis.verdict == "explained"
     assert any("cannot determine the play in the gear" in s for s in remark_sentences(diagnosis.remarks))
+
+
+def log_frames() -> Record:
+    """Return 8 s of a joint with friction that follows MIT frames at 200 Hz, firmware at 1 kHz, by RK2."""
+    t = 0.005 * np.arange(1600)
+    w = 2.0 * np.pi * np.array([[0.4], [2.1], [7.0]])
+    sizes = np.array([[0.5], [0.2], [0.05]])
+    angles, rates = (sizes * np.sin(w * t)).sum(0), (sizes * w * np.cos(w * t)).sum(0)
+    torques = 1.2 * np.sin(2.0 * np.pi * 3.3 * t) * np.exp(np.sin(t))
+
+    def acceleration(speed: float) -> float:
+        return (u - 0.2 * speed - 0.15 * np.tanh(speed / 2e-3)) / 0.038
+
+    q, v, h, shown = 0.0, 0.0, 2e-4, []
+    for angle, rate, torque in zip(angles, rates, torques, strict=True):
+        shown.append(q)
+        for k in range(25):
+            if k % 5 == 0:
+                u = 30.0 * (angle - q) + 0.8 * (rate - v) + torque
+            middle = v + 0.5 * h * acceleration(v)
+            q, v = q + h * middle, v + h * acceleration(middle)
+    noisy = np.array(shown) + 2e-4 * np.random.default_rng(3).standard_normal(len(t))
+    channels = {"reference": angles, "reference_velocity": rates, "command": torques, "position": noisy}
+    return Record({n: Channel(t, y) for n, y in channels.items()}, source="frames")
+
+
+def test_friction_of_a_joint_that_follows_mit_frames_is_named_with_its_size():
+    rig = rigid(load_rig("pd_joint"), "mit", k_p=30.0, k_d=0.8)
+    found = diagnose([log_frames()], rig, settings=replace(SETTINGS, max_causes=1))
+    (cause,) = found.causes
+    low, high = cause.parameters["torque"].ci95
+    assert (found.verdict, cause.name, cause.status) == ("explained", "coulomb_friction", "confirmed")
+    assert low < 0.15 < high < 0.16
+
+
+def rigid(rig: Rig, kind: str, **gains: float) -> Rig:
+    """Return a rig without spring and gravity, in another kind of loop."""
+    values = {n: q for n, q in rig.quantities.items() if n.split(".")[0] not in ("spring", "controller")}
+    values |= {f"controller.{n}": Quantity(v) for n, v in (gains | {"sample_time": 1e-3}).items()}
+    values |= {"spring_end.gravity": Quantity(0.0), "rotor.reflected_inertia": Quantity(0.03, 0.5)}
+    return replace(rig, quantities=values, rigid_spring=True, loop=kind)
 
 
 def test_a_joint_with_other_values_has_no_cause():

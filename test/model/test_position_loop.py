@@ -20,6 +20,7 @@ from rsea_ros.records.record import Channel, Record
 
 RATE = 200.0
 T = np.arange(400) / RATE
+PD, STIFF = {"k_p": 60.0, "k_d": 2.0}, {"value": 60.0, "unit": "N m/rad"}
 STEPPING = np.where(T < 0.5, 0.0, np.where(T < 1.2, 0.3, -0.2))
 
 
@@ -30,7 +31,7 @@ def joint(kind: str = "pd", **values: float) -> Rig:
 
 
 def rigid_quantities(kind: str) -> dict[str, Quantity]:
-    gains = {"pd": {"k_p": 60.0, "k_d": 2.0}, "cascade": {"k_pos": 8.0, "k_v": 6.0}}[kind]
+    gains = {"p": {"k_p": 60.0}, "mit": PD, "pd": PD, "cascade": {"k_pos": 8.0, "k_v": 6.0}}[kind]
     rig = load_rig("bare_drive").with_values(
         {"rotor.reflected_inertia": 0.05, "rotor.reflected_damping": 0.8, "spring_end.inertia": 0.03}
     )
@@ -43,7 +44,7 @@ def move_rig(rig: Rig, targets=STEPPING, **options) -> dict[str, np.ndarray]:
     return simulate(rig, Record({"reference": Channel(T, targets), **blank}, source="joint"), **options)
 
 
-def by_scipy(rig: Rig, law) -> np.ndarray:
+def by_scipy(rig: Rig, law, targets=STEPPING) -> np.ndarray:
     """Integrate with the loop's torque held over the simulation's step: position at the end of each hold."""
     a, b, c = slow.state_matrices(rig)
     n, parts = len(b), 5
@@ -52,7 +53,7 @@ def by_scipy(rig: Rig, law) -> np.ndarray:
     block[:n, :n], block[:n, n] = a * step, b * step
     phi, x, states = expm(block), np.zeros(n), []
     for k in range(parts * len(T)):
-        u = law(STEPPING[k // parts], c[0] @ x, c[1] @ x, step)
+        u = law(targets[k // parts], c[0] @ x, c[1] @ x, step)
         x = phi[:n, :n] @ x + phi[:n, n] * u
         states.append(c[0] @ x)
     return np.array(states[parts - 1 :: parts])
@@ -119,7 +120,28 @@ def test_the_encoder_may_sit_behind_the_play():
     assert lost["spring_end"] > 2.0 * lost["gear_output"]
 
 
-@pytest.mark.parametrize("kind", ["pd", "cascade"])
+def test_a_mit_frame_asks_for_an_angle_a_speed_and_a_torque():
+    rates, torques = np.gradient(STEPPING, T), 2.0 * np.sin(2 * np.pi * 3.0 * T)
+    rig = joint("mit", k_p=25.0, k_d=1.5)
+    frames = np.column_stack([STEPPING, rates, torques])
+
+    def law(frame, angle, speed, step):
+        return 25.0 * (frame[0] - angle) + 1.5 * (frame[1] - speed) + frame[2]
+
+    channels = {"reference": STEPPING, "reference_velocity": rates, "command": torques}
+    stamped = {n: Channel(T, y) for n, y in channels.items()}
+    record = Record({**stamped, "position": Channel(T + 1 / RATE, np.zeros(len(T)))}, source="frames")
+    assert simulate(rig, record)["position"] == pytest.approx(by_scipy(rig, law, frames), abs=1e-9)
+    once = with_command(record, rig)
+    assert np.array_equal(with_command(once, rig)["command"].y, once["command"].y)
+
+
+def test_a_p_loop_is_a_pd_loop_without_the_rest():
+    alike = joint("p", k_p=60.0), joint("pd", k_p=60.0, k_d=0.0)
+    assert np.array_equal(*(move_rig(rig)["position"] for rig in alike))
+
+
+@pytest.mark.parametrize("kind", ["pd", "cascade", "mit"])
 def test_the_linear_response_is_that_of_the_simulation(kind):
     rig = joint(kind)
     f = 4.0
@@ -140,6 +162,10 @@ def test_the_linear_response_is_that_of_the_simulation(kind):
         ({"kind": "pd", "k_d": {"value": 1.0, "unit": "N m s/rad"}}, "controller.k_p"),
         ({"kind": "pd", "k_p": {"value": 1.0, "unit": "1/s"}}, "controller.k_p"),
         ({"kind": "pd", "k_p": {"value": -1.0, "unit": "N m/rad"}}, "controller.k_p"),
+        ({"kind": "p", "k_p": STIFF, "k_d": {"value": 1.0, "unit": "N m s/rad"}}, "controller"),
+        ({"kind": "mit", "k_p": {"value": 0.0, "unit": "N m/rad"}}, "controller.k_p"),
+        ({"kind": "mit", "k_p": {**STIFF, "spread": 0.1}}, "controller.k_p"),
+        ({"kind": "mit", "k_p": STIFF, "velocity_limit": {"value": 1.0, "unit": "rad/s"}}, "controller"),
     ],
 )
 def test_an_impossible_loop_is_refused(change, field):

@@ -119,8 +119,19 @@ def test_fields_that_nobody_measures_are_no_channels(tmp_path):
 
 def test_the_reference_of_a_closed_loop_is_read(tmp_path):
     rows = run_rows(4)
-    rows += [("/rsea/desired_position", at, joint_state(at, position=[1.25])) for _, at, _ in rows[::3]]
-    assert read_record(write_foreign(tmp_path / "bag", rows))["reference"].y.tolist() == [1.25] * 4
+    targets = {"position": [1.25], "velocity": [0.5]}
+    rows += [("/rsea/desired_position", at, joint_state(at, **targets)) for _, at, _ in rows[::3]]
+    got = read_record(write_foreign(tmp_path / "bag", rows))
+    assert got["reference"].y.tolist() == [1.25] * 4
+    assert got["reference_velocity"].y.tolist() == [0.5] * 4
+
+
+def test_a_target_that_is_a_number_alone_is_an_angle(tmp_path):
+    rows = run_rows(4)
+    number = make("std_msgs/msg/Float64", data=1.25)
+    rows += [("/rsea/desired_position", at, number) for _, at, _ in rows[::3]]
+    got = read_record(write_foreign(tmp_path / "bag", rows))
+    assert "reference" in got and "reference_velocity" not in got
 
 
 @pytest.mark.parametrize("storage", [MCAP, SQLITE])
