@@ -148,6 +148,12 @@ def directional(t, x, u, p):
     return u, size * sign(x[1]), 0.0
 
 
+def gear_loss(t, x, u, p):
+    size = p["mean"] * abs(u) * x[2] + p["difference"] * u * x[2] ** 2
+    w, a, torque = motion(x[:2], u, size)
+    return [w, a, (w - abs(w) * x[2]) / p["angle"]], torque
+
+
 def eccentricity(t, x, u, p):
     w, a, torque = motion(x, u)
     wave = p["cycles_per_revolution"] * RATIO
@@ -175,6 +181,7 @@ LAWS: dict[str, tuple[int, Law]] = {
     "ft_gain_error": (2, sensor(lambda torque, t, p: torque * p["gain"])),
     "ft_sensor_lag": (3, sensor_lag),
     "gear_compliance": (4, gear),
+    "gear_loss": (3, gear_loss),
     "hard_stop": (2, plain(stop)),
     "load_dependent_friction": (2, plain(load_dependent)),
     "lopsided_spring": (2, plain(lambda t, x, u, p: (u, 0.0, K_S * p["quadratic"] * x[0] ** 2))),

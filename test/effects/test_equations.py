@@ -110,6 +110,7 @@ VARIANTS = {
         slow_equations.LAWS["directional_load_friction"][1],
         {"motor_coefficient": 0.1, "load_coefficient": 0.02, "quadratic": 0.01, "creep_velocity": 2e-3},
     ),
+    "gear_loss": (3, slow_equations.gear_loss, {"mean": 0.2, "difference": -0.06, "angle": 4e-3}),
     "gravity_error": (4, payload, {"torque": -4.0}),
 }
 
