@@ -192,7 +192,8 @@ def _another(
     """Yield the findings by which the machine of a record differs from a rig whose values no pair shows."""
     named = {f.channel for f in known if f.kind != "noise"}
     if is_inverse(rig):
-        yield from () if "spring_end.stiffness" in named else rig_findings.restoring_findings(record, rig)
+        is_told = not rig.rigid_spring or "spring_end.stiffness" in named
+        yield from () if is_told else rig_findings.restoring_findings(record, rig)
         return
     if {f.kind for f in known} & {"sign", "scale", "wrong_rig", "clock_offset"} or is_held(rig):
         return

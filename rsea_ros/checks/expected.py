@@ -18,7 +18,7 @@ import numpy as np
 
 from rsea_ros.errors import RseaError
 from rsea_ros.model.extent import is_too_fast
-from rsea_ros.model.inverse import inverse_torque, is_inverse, motion_from
+from rsea_ros.model.inverse import is_inverse, motion_from, torques_along
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.simulation import simulate
 from rsea_ros.records.record import BoolArray, Channel, ComplexArray, FloatArray, IntArray, Record
@@ -204,9 +204,10 @@ def sides(record: Record, rig: Rig) -> Mapping[str, Side]:
 def _inverse(record: Record, rig: Rig) -> Mapping[str, Side]:
     if "position" not in record:
         return {}
-    motion = motion_from(record)
+    motion = motion_from(record, rig)
     known = motion.counts if motion.counts.any() else np.ones(len(motion.t), bool)
-    return {"motor_torque": Side(motion.t[known], motion.torque[known], inverse_torque(rig, motion)[known])}
+    taken = torques_along(rig, motion)
+    return {n: Side(motion.t[known], y[known], taken[n][known]) for n, y in motion.judged.items()}
 
 
 def is_full_of_gaps(record: Record) -> bool:

@@ -74,11 +74,13 @@ def worst(lights: Sequence[Light]) -> Light:
 def unused_sentence(record: Record, rig: Rig) -> str:
     """Return which channels a fit does not use and why, empty where it uses all.
 
-    A drive without a spring is judged by its torque; only a MIT frame has a torque beside its targets.
+    A drive without a spring, and one that is moved, is judged by its torque; only a MIT frame has a torque
+    beside its targets.
     """
     beside = {"velocity"} if is_inverse(rig) else set()
     unused = ", ".join(n for n in record.channels if not rig.measures(n) or n in beside)
-    said = [f"a rig without a spring makes no use of {unused}"] if unused else []
+    judge = "a rig without a spring" if rig.rigid_spring else "a measured motion"
+    said = [f"{judge} makes no use of {unused}"] if unused else []
     targets = [n for n in COMMANDS if n in record and n != "reference"]
     if targets and rig.loop not in (None, "mit") and "reference" in record:
         said.append(f"a {rig.loop} loop makes no use of {', '.join(targets)} beside reference; `mit` does")

@@ -140,7 +140,7 @@ def is_held(rig: Rig) -> bool:
         one = mechanics(rig, linear_gravity=True).order == 1
     except (RseaError, ValueError):
         return False
-    return one and not rig.rigid_spring and rig.ft_end == "spring_end"
+    return one and not rig.rigid_spring and rig.ft_end == "spring_end" and rig.motion != "measured"
 
 
 def laws(record: Record, rig: Rig) -> tuple[Law, ...]:
@@ -173,7 +173,7 @@ def laws(record: Record, rig: Rig) -> tuple[Law, ...]:
 
 def _of_torque(torque: str, rig: Rig, m: Mechanics, held: bool) -> list[Law]:
     """Return the laws between a torque and what it moves."""
-    if m.order != 1:
+    if m.order != 1 or rig.motion == "measured":
         stated = (rig["rotor.reflected_damping"], gear_inertia(rig))
         rotor = [Law(torque, "position", (1, 2), stated, _ROTOR, "ft")]
         grounded = "housing_end" in rig.clamped and rig.ft_end == "spring_end"

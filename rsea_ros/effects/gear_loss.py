@@ -2,11 +2,12 @@
 
     T = -(mean · |T_m| · z + difference · T_m · z²), ż = (ω - |ω| · z) / angle
 
-T_m is the motor's torque at the gear output, ω the speed of the gear output against the housing. z follows the
-direction of motion over an angle (presliding) and ends at its sign: a gear that drives loses (mean +
-difference) |T_m|, one that is driven back (mean - difference) |T_m|. It reads no load, so a rigid joint has it
-too. With ω of the middle of a step z is an exponential of the travel, exactly; the means of z and z² over the
-step act. Source: torque-proportional loss in dcmotor, MuJoCo issue 3528, 2026 (strain-wave and cycloidal gears).
+T_m is the motor's torque at the gear output, ω the speed of the gear output against the housing. z follows
+the direction of motion over an angle (presliding) and ends at its sign: a gear that drives loses (mean +
+difference) |T_m|, one that is driven back (mean - difference) |T_m|. It reads no load, so a rigid joint has
+it too. With ω of the middle of a step z is an exponential of the travel, exactly; the means of z and z² over
+the step act. Source: torque-proportional loss in dcmotor, MuJoCo issue 3528, 2026 (strain-wave and cycloidal
+gears).
 """
 
 import math

@@ -149,10 +149,17 @@ def unknowns_of(rig: Rig, cases: Sequence[Case]) -> tuple[Unknown, ...]:
     stated = _stated_effects(rig, cases)
     effects = [unknowns_of_effect(e, start, rig.known | idle(e, rig)) for e, start in stated]
     return (
-        *unknowns_of_rig(rig),
+        *(u for u in unknowns_of_rig(rig) if not u.name.startswith(_beside(rig, channels))),
         *(u for group in effects for u in group),
         *(clocks(channels, rig) if not is_inverse(rig) else ()),
     )
+
+
+def _beside(rig: Rig, channels: Collection[str]) -> tuple[str, ...]:
+    """Return the parts of a rig that channels along a measured motion say nothing of."""
+    if rig.motion != "measured":
+        return ()
+    return ("spring_end.",) if "ft" in channels else ("spring_end.", "spring.")
 
 
 def _stated_effects(rig: Rig, cases: Sequence[Case]) -> Iterator[tuple[Effect, Mapping[str, float]]]:

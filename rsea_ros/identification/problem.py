@@ -15,7 +15,7 @@ from rsea_ros.identification.settings import NOISE, NoiseSettings
 from rsea_ros.identification.unknowns import Clocks, Unknown, apply
 from rsea_ros.model.drive import Drive, SpringStart, outside_gaps, zero_unknown
 from rsea_ros.model.extent import SKIPPED_START
-from rsea_ros.model.inverse import CUT_OFF, Motion, acting_torque, inverse_torque, is_inverse, motion_from
+from rsea_ros.model.inverse import CUT_OFF, Motion, acting_torque, is_inverse, motion_from, torques_along
 from rsea_ros.model.position_loop import with_command
 from rsea_ros.model.rig import Rig, Sensor
 from rsea_ros.model.simulation import drive_of, simulate_drives
@@ -151,26 +151,32 @@ def channels_that_tell(record: Record, rig: Rig) -> list[str]:
 
 
 def _inverse_case(record: Record, rig: Rig, rule: NoiseSettings) -> Case:
-    """Make a record of a drive without a spring ready: its torque against the one that its motion takes.
+    """Make a record that is judged along its measured motion ready: its torques against those that it takes.
 
-    Noise: the part that passes the filter of the white noise at the top of the torque's band, or
+    Noise: the part that passes the filter of the white noise at the top of a torque's band, or
     where that is not flat of the stated noise, if that is more.
     """
-    motion, torque = motion_from(record), acting_torque(record)
+    motion, torque = motion_from(record, rig), acting_torque(record)
     for name, channel in (("position", record["position"]), ("the torque that acted", torque)):
         if channel.is_still:
             raise IdentificationError(
                 f"{record.source}: {name} holds one value, expected motion: "
                 "a rig without a spring is judged by what moves it"
             )
-    level, is_flat = top_of_band(torque.y, rule=rule)
-    stated = 0.0 if is_flat else rig.sensors.get("motor_torque", Sensor()).noise
-    noise = max(level, stated) * math.sqrt(min(1.0, 2.0 * CUT_OFF / torque.rate))
+    judged = motion.judged
+    known = {"motor_torque": torque, **{n: record[n] for n in judged if n != "motor_torque"}}
     return Case(
-        drive=motion, t={"motor_torque": motion.t}, measured={"motor_torque": motion.torque},
-        noise={"motor_torque": max(noise, 1e-6 * float(np.std(torque.y)), 1e-300)},
-        mask={"motor_torque": motion.counts}, source=record.source,
+        drive=motion, t=dict.fromkeys(judged, motion.t), measured=judged,
+        noise={n: _filtered_noise(known[n], rig.sensors.get(n, Sensor()), rule) for n in judged},
+        mask=dict.fromkeys(judged, motion.counts), source=record.source,
+        floating=frozenset({"ft"} if "ft" in judged and rig.zero_unknown("deflection") else ()),
     )
+
+
+def _filtered_noise(torque: Channel, sensor: Sensor, rule: NoiseSettings) -> float:
+    level, is_flat = top_of_band(torque.y, rule=rule)
+    noise = max(level, 0.0 if is_flat else sensor.noise) * math.sqrt(min(1.0, 2.0 * CUT_OFF / torque.rate))
+    return max(noise, 1e-6 * float(np.std(torque.y)), 1e-300)
 
 
 def simulate_cases(
@@ -184,7 +190,7 @@ def simulate_cases(
     at = [[_instants(drive, one) for one in clocks] for drive in drives]
     simulations = iter(simulate_drives(rig, drives, at, on_angle=on_angle))
     by_case = [
-        [{"motor_torque": inverse_torque(rig, c.drive)}] * len(clocks)
+        [_on_measured_zero(c, torques_along(rig, c.drive))] * len(clocks)
         if isinstance(c.drive, Motion)
         else [_on_measured_zero(c, outputs) for outputs in next(simulations)]
         for c in cases

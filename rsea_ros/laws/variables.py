@@ -231,7 +231,8 @@ class CaseModel:
         """Return the response of each measured channel to values along the steps, acting at a place."""
         case = self.case
         if self.injector is None:
-            return {"motor_torque": -smooth(values, self.variables.step)}
+            nothing = {n: np.zeros(len(t)) for n, t in case.t.items()}
+            return {**nothing, "motor_torque": -smooth(values, self.variables.step)}
         if place not in ("ft", "encoder"):
             return self.injector.answers(values, place)
         made = {n: np.zeros(len(t)) for n, t in case.t.items()}

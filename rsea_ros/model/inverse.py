@@ -1,4 +1,4 @@
-"""The inverse model: the motor torque that a measured motion takes.
+"""The inverse model: the torques that a measured motion takes.
 
 A drive without a spring drifts freely, so a simulation on its commands runs away from the measurement and
 the right model may look worse than the wrong one. The field uses the inverse
@@ -7,11 +7,16 @@ torques, filtered alike:
 
     T = J q'' + D q' + K q + m g l sin(q) - (torques of the effects)
 
+A spring whose far end something else moves (`motion: measured`: contact, walking, a dynamometer) is in
+
+    T = J q'' + B q' + T_s - (effects at the gear),   T_s = K_s d + b_s d' + (effects at the spring)
+
+with the measured deflection d: T and T_s are compared. Without d the F/T sensor's torque is T_s, and T is.
 Effects on a command are undone where only the commanded torque is known; a limit cannot be undone.
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -19,9 +24,9 @@ from rsea_ros.compiler import njit
 from rsea_ros.effects import signal_table as st
 from rsea_ros.errors import IdentificationError
 from rsea_ros.model.drive import gaps
-from rsea_ros.model.equations import mechanics, with_structure
+from rsea_ros.model.equations import Mechanics, mechanics, with_structure
 from rsea_ros.model.extent import SKIPPED_START, check_extent, check_slow
-from rsea_ros.model.rig import Rig
+from rsea_ros.model.rig import END_NAMES, Rig
 from rsea_ros.model.simulation import Machine, build
 from rsea_ros.model.step import Calls, call_port
 from rsea_ros.records.holds import AT_EDGE
@@ -47,9 +52,12 @@ torque, by which the model is judged: friction of it took its noise away."""
 _UNDOINGS = 4
 """Rounds that undo what effects make of a command: delays and lags of up to 60 degrees within the band."""
 
-_COMMAND, _MOTOR, _GEAR, _SENSOR = (
-    int(port) for port in (st.Port.COMMAND, st.Port.MOTOR, st.Port.GEAR, st.Port.SENSOR)
-)
+_COMMAND, _MOTOR, _GEAR, _SPRING, _SENSOR = (int(port) for port in st.Port if port != st.Port.STRUCTURE)
+
+
+def _nothing() -> FloatArray:
+    return np.empty(0)
+
 
 
 @dataclass(frozen=True)
@@ -57,7 +65,8 @@ class Motion:
     """A measured motion on a uniform grid, filtered: t (s), q (rad), v (rad/s), a (rad/s^2), torque (N m).
 
     counts: where the filter has settled, outside the gaps of the record, shape of t.
-    commanded: the torque is the command, not a measurement.
+    commanded: the torque is the command, not a measurement. Of a rig whose output is moved, ft: torque of the
+    F/T sensor (N m); d, d_rate: the spring's deflection (rad, rad/s); each empty where it was not measured.
     """
 
     t: FloatArray
@@ -67,11 +76,20 @@ class Motion:
     torque: FloatArray
     counts: BoolArray
     commanded: bool = False
+    ft: FloatArray = field(default_factory=_nothing)
+    d: FloatArray = field(default_factory=_nothing)
+    d_rate: FloatArray = field(default_factory=_nothing)
+
+    @property
+    def judged(self) -> dict[str, FloatArray]:
+        """The measured torques that a model is compared with, N m; the F/T sensor's where d is known."""
+        ft = {"ft": self.ft} if len(self.ft) and len(self.d) else {}
+        return {"motor_torque": self.torque, **ft}
 
 
 def is_inverse(rig: Rig) -> bool:
-    """Return whether a rig is compared by torque: neither spring nor position loop holds it, so it drifts."""
-    return rig.rigid_spring and rig.loop is None
+    """Return whether a rig is compared by torque: nothing that it has holds it, so that it drifts."""
+    return (rig.rigid_spring or rig.motion == "measured") and rig.loop is None
 
 
 def require_position(record: Record) -> None:
@@ -83,15 +101,22 @@ def require_position(record: Record) -> None:
         )
 
 
-def motion_from(record: Record) -> Motion:
+def motion_from(record: Record, rig: Rig | None = None) -> Motion:
     """Return the filtered motion and the torque that acted. Raises IdentificationError without a position.
 
+    rig: of one whose output is moved, what its spring shows, too: without deflection and F/T nothing does.
     Each side of a gap is filtered by itself, and a gap has a straight line.
     """
     require_position(record)
     from scipy.interpolate import CubicSpline  # with its like in `smoothed`, 0.4 s that a spring saves
 
-    record = _finite(record)
+    beside = [n for n in ("deflection", "ft") if rig is not None and rig.motion == "measured" and n in record]
+    if rig is not None and rig.motion == "measured" and not beside:
+        raise IdentificationError(
+            f"{record.source}: no deflection or ft channel, expected one: {rig.name} is moved from outside"
+        )
+    used = {"command", "position", "motor_torque", *beside}
+    record = _finite(replace(record, channels={n: c for n, c in record.channels.items() if n in used}))
     position = record["position"]
     if len(position) < FEWEST:
         raise IdentificationError(
@@ -105,21 +130,43 @@ def motion_from(record: Record) -> Motion:
     t = np.arange(position.t[0], position.t[-1] + 0.5 * step, step)
     q, torque = np.interp(t, position.t, position.y), _torque_at(record, t)
     v, a = np.zeros(len(t)), np.zeros(len(t))
-    counts = np.zeros(len(t), bool)
+    counts, shown = np.zeros(len(t), bool), {n: np.zeros(len(t)) for n in beside}
     for begin, end in _sampled_spans(record, float(t[0]), float(t[-1])):
         part = slice(*np.searchsorted(t, [begin - 0.5 * step, end + 0.5 * step]))
         known = position.between(begin, end + 0.5 * step)
         q[part] = smooth(CubicSpline(known.t, known.y)(t[part]), step)
         v[part] = np.gradient(q[part], step)
         a[part], torque[part] = np.gradient(v[part], step), smooth(torque[part], step)
+        for n, values in shown.items():
+            one = record[n].between(begin, end + 0.5 * step)
+            values[part] = smooth(CubicSpline(one.t, one.y)(t[part]), step)
         counts[part] = (t[part] >= t[part][0] + SKIPPED_START) & (t[part] <= t[part][-1] - SKIPPED_START)
     t, q, v, a, torque = (np.asarray(values[::finer], np.float64) for values in (t, q, v, a, torque))
-    return Motion(t, q, v, a, torque, counts[::finer], commanded="motor_torque" not in record)
+    rate = np.gradient(shown["deflection"], step) if "deflection" in shown else _nothing()
+    ft, d = (np.asarray(shown.get(n, _nothing())[::finer], np.float64) for n in ("ft", "deflection"))
+    commanded = "motor_torque" not in record
+    counts = counts[::finer] & ~_reverses(v, period) if beside else counts[::finer]
+    return Motion(t, q, v, a, torque, counts, commanded, ft, d, np.asarray(rate[::finer]))
+
+
+def _reverses(v: FloatArray, period: float) -> BoolArray:
+    """Return where a filtered motion is nearly at rest, or was within the filter's reach: a gear that sticks
+    holds by any torque there, which no law of the speed says."""
+    from scipy.ndimage import binary_dilation
+
+    slow = np.abs(v) < _NEARLY_AT_REST * float(np.sqrt(np.mean(v**2)))
+    reach = math.ceil(1.0 / (CUT_OFF * period))
+    return np.asarray(binary_dilation(slow, np.ones(2 * reach + 1, bool)), bool)
+
+
+_NEARLY_AT_REST = 0.02
+"""Of the speed's RMS."""
+_FILTERED = ("position", "motor_torque", "deflection", "ft")
 
 
 def _sampled_spans(record: Record, start: float, stop: float) -> list[tuple[float, float]]:
     """Return begin and end (s) of the parts between gaps of the motion or its torque; short ones are gaps."""
-    each = [Record({n: c}) for n, c in record.channels.items() if n in ("position", "motor_torque")]
+    each = [Record({n: c}) for n, c in record.channels.items() if n in _FILTERED]
     lost = sorted(gap for one in each for gap in gaps(one))
     ends, begins = [*(a for a, _ in lost), stop], [start, *(b for _, b in lost)]
     parts = [(max(begins[: k + 1]), min(ends[k:])) for k in range(len(ends))]
@@ -129,7 +176,7 @@ def _sampled_spans(record: Record, start: float, stop: float) -> list[tuple[floa
 
 def _finite(record: Record) -> Record:
     """Return the record without the samples of motion and torque that are NaN: one spoils a filter."""
-    kept = {n: (c, np.isfinite(c.y)) for n, c in record.channels.items() if n in ("position", "motor_torque")}
+    kept = {n: (c, np.isfinite(c.y)) for n, c in record.channels.items() if n in _FILTERED}
     held = {n: Channel(c.t[good], c.y[good]) for n, (c, good) in kept.items() if not good.all()}
     empty = {n for n, c in held.items() if not len(c)} - {"position"}
     channels = {n: c for n, c in {**record.channels, **held}.items() if n not in empty}
@@ -172,7 +219,14 @@ def smooth(values: FloatArray, period: float) -> FloatArray:
 
 def inverse_torque(rig: Rig, motion: Motion) -> FloatArray:
     """Return the motor torque that a motion takes, N m, filtered like the motion, shape of motion.t."""
+    return torques_along(rig, motion)["motor_torque"]
+
+
+def torques_along(rig: Rig, motion: Motion) -> dict[str, FloatArray]:
+    """Return the torques of `motion.judged` that a motion takes, N m, filtered like the motion."""
     rig_as_is = with_structure(rig)
+    if rig.motion == "measured":
+        rig_as_is = replace(rig_as_is, clamped=frozenset(END_NAMES))
     m = mechanics(rig_as_is, linear_gravity=False)
     if m.order != 1 or "housing_end" not in rig.clamped:
         raise IdentificationError(
@@ -181,20 +235,46 @@ def inverse_torque(rig: Rig, motion: Motion) -> FloatArray:
     period = float(motion.t[1] - motion.t[0])
     machine = build(rig, period, float(motion.t[-1] - motion.t[0]))
     motion = _as_moved(machine, motion, period)
+    if rig.motion == "measured":
+        return _beside_spring(rig_as_is, m, machine, motion, period)
     gravity = rig_as_is["spring_end.gravity"] * np.sin(motion.q + rig_as_is["spring_end.gravity_angle"])
     linear = m.mass[0, 0] * motion.a + m.damping[0, 0] * motion.v + m.stiffness[0, 0] * motion.q
     load = gravity + sum(
         rig_as_is[f"spring_end.{name}"] * values
         for name, values in (("inertia", motion.a), ("damping", motion.v), ("stiffness", motion.q))
     )
+    nothing = np.zeros(len(motion.t))
+    return {"motor_torque": _needed(machine, motion, linear, gravity, load, nothing, nothing, period)[0]}
+
+
+def _beside_spring(
+    rig: Rig, m: Mechanics, machine: Machine, motion: Motion, period: float
+) -> dict[str, FloatArray]:
+    """Return the torques of a motor and its spring along their measured motions."""
+    nothing = np.zeros(len(motion.t))
+    d, rate = (motion.d, motion.d_rate) if len(motion.d) else (nothing, nothing)
+    load = rig["spring.stiffness"] * d + rig["spring.damping"] * rate if len(motion.d) else motion.ft
+    damping = m.damping[0, 0] - rig["spring.damping"]
+    linear = m.mass[0, 0] * motion.a + damping * motion.v + load
+    torque, shown = _needed(machine, motion, linear, nothing, load, d, rate, period)
+    found = {"motor_torque": torque, "ft": load + smooth(shown - load, period)}
+    return {n: found[n] for n in motion.judged}
+
+
+def _needed(
+    machine: Machine, motion: Motion, linear: FloatArray, gravity: FloatArray, load: FloatArray,
+    d: FloatArray, d_rate: FloatArray, period: float,
+) -> tuple[FloatArray, FloatArray]:  # fmt: skip
+    """Return the motor's torque and the F/T sensor's, found in rounds: some effects depend on the former."""
     gains = motor_gains(*_parts(machine), len(motion.t))
     needed, added = (linear + smooth(gravity, period)) / gains, np.zeros(len(motion.t))
     for _ in range(_ROUNDS):
-        before, added = added, _effect_torques(*_parts(machine), motion.q, motion.v, needed, load)
+        before = added
+        added, shown = _effect_torques(*_parts(machine), motion.q, motion.v, needed, load, d, d_rate)
         if np.array_equal(before, added):
             break
         needed = (linear + smooth(gravity - added, period)) / gains
-    return _undone(machine, motion, needed, period) if motion.commanded else needed
+    return (_undone(machine, motion, needed, period) if motion.commanded else needed), shown
 
 
 def _parts(machine: Machine) -> tuple[Calls, FloatArray, FloatArray]:
@@ -258,15 +338,22 @@ def _sensor_errors(calls, s, effect_x, q):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def _effect_torques(calls, s, effect_x, q, v, torque, load):  # type: ignore[no-untyped-def]
-    """Return the torque (N m) that the effects add at the gear along a motion."""
-    added = np.empty(len(q))
-    s[st.MOBILITY] = s[st.GEAR_VELOCITY_SPAN] = 0.0
+def _effect_torques(calls, s, effect_x, q, v, torque, load, d, d_rate):  # type: ignore[no-untyped-def]
+    """Return the torque (N m) that the effects add at the gear along a motion, less what they add in the
+    spring, and the torque that the F/T sensor shows."""
+    added, shown = np.empty(len(q)), np.empty(len(q))
+    s[st.MOBILITY] = s[st.GEAR_VELOCITY_SPAN] = s[st.DEFLECTION_SPAN] = 0.0
     s[st.CREEP] = _SIGN
     for k in range(len(q)):
-        s[st.TIME], s[st.COMMAND], s[st.LOAD] = k * s[st.STEP], torque[k], load[k]
+        s[st.TIME], s[st.COMMAND] = k * s[st.STEP], torque[k]
         s[st.GEAR_ANGLE], s[st.GEAR_VELOCITY], s[st.ROTOR_ANGLE] = q[k], v[k], s[st.TURNS] * q[k]
-        s[st.GEAR_TORQUE] = 0.0
+        s[st.DEFLECTION], s[st.DEFLECTION_RATE] = d[k], d_rate[k]
+        s[st.SPRING_TORQUE] = s[st.GEAR_TORQUE] = 0.0
+        call_port(_SPRING, calls, s.ctypes.data, calls.p.ctypes.data, effect_x.ctypes.data)
+        s[st.LOAD] = s[st.FT] = load[k] + s[st.SPRING_TORQUE]
         call_port(_GEAR, calls, s.ctypes.data, calls.p.ctypes.data, effect_x.ctypes.data)
-        added[k] = s[st.GEAR_TORQUE]
-    return added
+        added[k] = s[st.GEAR_TORQUE] - s[st.SPRING_TORQUE]
+        s[st.POSITION] = s[st.OUTPUT_ANGLE] = q[k]
+        call_port(_SENSOR, calls, s.ctypes.data, calls.p.ctypes.data, effect_x.ctypes.data)
+        shown[k] = s[st.FT]
+    return added, shown

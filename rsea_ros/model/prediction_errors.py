@@ -11,7 +11,7 @@ from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.errors import IdentificationError, ParameterError
 from rsea_ros.model.drive import outside_gaps
 from rsea_ros.model.extent import SKIPPED_START, bound_values, check_command, check_pace
-from rsea_ros.model.inverse import inverse_torque, is_inverse, motion_from
+from rsea_ros.model.inverse import is_inverse, motion_from, torques_along
 from rsea_ros.model.position_loop import with_command
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
@@ -103,8 +103,8 @@ def predict(record: Record | Rig | str, rig: Rig | str | Record) -> Mapping[str,
 
     rig: a Rig, a file, or the name of a rig in config/rigs; the other order means the same. Returns a
     Comparison for each channel by name.
-    For a rig without a spring it compares the torque of the measured motion (see inverse.py); for a sensor
-    with an unknown zero it compares changes. Behind a gap of the whole record it begins anew.
+    For a rig without a spring, or a measured motion, it compares the torques along it (see inverse.py); for
+    a sensor with an unknown zero it compares changes. Behind a gap of the whole record it begins anew.
     Raises IdentificationError for a record with nothing to compare. Nothing is fitted.
     """
     record, rig = (rig, record) if isinstance(rig, Record) else (record, rig)
@@ -116,9 +116,9 @@ def predict(record: Record | Rig | str, rig: Rig | str | Record) -> Mapping[str,
     check_pace(record)
     record = replace(record, channels={n: c for n, c in record.channels.items() if len(c)})
     if is_inverse(rig):
-        motion = motion_from(record)
-        torque = inverse_torque(rig, motion)
-        return {"motor_torque": _comparison(motion.t, motion.torque, torque, motion.counts)}
+        motion = motion_from(record, rig)
+        taken = torques_along(rig, motion)
+        return {n: _comparison(motion.t, y, taken[n], motion.counts) for n, y in motion.judged.items()}
     rig = in_phase(rig, record)
     compared = {n: _comparison(record[n].t, record[n].y, y) for n, y in simulate(rig, record).items()}
     known = {n: outside_gaps(record, c.t, SKIPPED_START) for n, c in compared.items()}

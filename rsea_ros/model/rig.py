@@ -194,10 +194,12 @@ class Rig:
     other_trains: other possible gear trains. known: names that no fit may change. proximal: the end that the
     paper calls *proximal*. ft_end: the end with the F/T sensor; at the housing end it measures the proximal
     spring, between housing and that end. encoder_end: the part that the encoder measures against the housing:
-    the gear output, or the spring end behind backlash and spring. loop: kind of the position loop whose
-    targets command the bench, a key of LOOP_FIELDS; its gains are among the quantities. controller: a loop
-    that added its torque to the command of the record. hold: the command between two samples: the first of
-    them, a line between them, or the band-limited curve of an analogue command sampled behind a filter.
+    the gear output, or the spring end behind backlash and spring. motion: `measured` where something else
+    moves the output: then torques are judged along the measured motion (model/inverse.py). loop: kind of the
+    position loop whose targets command the bench, a key of LOOP_FIELDS; its gains are among the quantities.
+    controller: a loop that added its torque to the command of the record. hold: the command between two
+    samples: the first of them, a line between them, or the band-limited curve of an analogue command sampled
+    behind a filter.
     """
 
     name: str
@@ -212,6 +214,7 @@ class Rig:
     proximal: str = "housing_end"
     ft_end: str = "spring_end"
     encoder_end: str = "gear_output"
+    motion: str = "simulated"
     loop: str | None = None
     controller: PositionLoop | None = None
     hold: Hold = "zero"
@@ -338,6 +341,7 @@ def check_structure(rig: Rig) -> None:
         rig[name]
     _check_encoder_end(rig)
     _check_loop(rig)
+    _check_motion(rig)
     for end in END_NAMES:
         if rig.end_is_free(end):
             rig[f"{end}.inertia"]
@@ -388,6 +392,22 @@ def _check_encoder_end(rig: Rig) -> None:
             f"rig {rig.name}: encoder_end = {rig.encoder_end!r}, expected gear_output or spring_end",
             "encoder_end",
         )
+
+
+def _check_motion(rig: Rig) -> None:
+    """Raise RigError for a measured motion of what the torques along it cannot be told of."""
+    expected = "expected simulated or measured"
+    if rig.motion not in ("simulated", "measured"):
+        raise RigError(f"rig {rig.name}: motion = {rig.motion!r}, {expected}", "motion")
+    reasons = {
+        "a rigid spring, which is judged so by itself": rig.rigid_spring,
+        "a position loop": rig.loop is not None,
+        "a housing that moves": rig.end_is_free("housing_end"),
+        "a gear that gives": not math.isinf(rig["gear.stiffness"]),
+        "the F/T sensor at the housing": rig.ft_end != "spring_end",
+    }
+    for what in (what for what, is_so in reasons.items() if is_so and rig.motion == "measured"):
+        raise RigError(f"rig {rig.name}: motion = measured with {what}, expected simulated", "motion")
 
 
 def _check_loop(rig: Rig) -> None:

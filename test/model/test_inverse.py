@@ -81,7 +81,7 @@ def test_spans_lie_between_the_gaps_of_motion_and_torque():
             keep &= (a >= T) | (b <= T)
         return channel(T[keep], T[keep])
 
-    record = Record({"position": at((3.0, 3.5)), "motor_torque": at((6.0, 6.5)), "ft": at((1.0, 2.0))})
+    record = Record({"position": at((3.0, 3.5)), "motor_torque": at((6.0, 6.5)), "command": at((1.0, 2.0))})
     spans = _sampled_spans(record, 0.0, 9.99)
     assert [x for span in spans for x in span] == pytest.approx([0.0, 3.0, 3.5, 6.0, 6.5, 9.99])
     short = Record({"position": at((3.0, 3.5), (3.7, 4.2))})

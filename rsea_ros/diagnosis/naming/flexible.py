@@ -172,12 +172,14 @@ def _spans(case: Case, signal: FloatArray) -> Sequence[tuple[int, int]]:
 def _signal(case: Case, out: dict[str, FloatArray], effect: Effect) -> FloatArray | None:
     """Return the effect's regressor, on the drive's steps or at the samples of the channel it adds to."""
     drive = case.drive
+    if effect.port is st.Port.SENSOR:
+        return out.get(effect.sensor)
     if not isinstance(drive, Drive):
+        if effect.port is st.Port.SPRING:
+            return drive.d if len(drive.d) else None
         return drive.v if st.GEAR_VELOCITY in effect.reads else None
     if effect.port in (st.Port.COMMAND, st.Port.MOTOR):
         return drive.command
-    if effect.port is st.Port.SENSOR:
-        return out.get(effect.sensor)
     middles = drive.start + drive.step * (np.arange(len(drive.command)) + 0.5)
     if st.GEAR_VELOCITY in effect.reads and "velocity" in out:
         return np.asarray(np.interp(middles, case.t["velocity"], out["velocity"]))
@@ -231,7 +233,8 @@ def _with_part(
         return [{**out, seen: out[seen] + part} for out, part in zip(base, parts, strict=True)]
     drives = [c.drive for c in problem.cases]
     if not all(isinstance(d, Drive) for d in drives):
-        return [{"motor_torque": o["motor_torque"] + p} for o, p in zip(base, parts, strict=True)]
+        both = {"motor_torque", "ft"} if effect.port is st.Port.SPRING else {"motor_torque"}
+        return [{n: y + p * (n in both) for n, y in o.items()} for o, p in zip(base, parts, strict=True)]
     size = _STEP * max(float(np.max(np.abs(d.command))) for d in drives if isinstance(d, Drive))
     pushed = [
         replace(d, command=d.command + size * p / max(float(np.max(np.abs(p))), 1e-300))
