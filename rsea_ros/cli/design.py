@@ -2,6 +2,7 @@
 
 import argparse
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,7 @@ from rsea_ros.cli._output import path
 from rsea_ros.cli._terminal import say
 from rsea_ros.design.mechanism import UNITS, Requirement
 from rsea_ros.design.motor_gear_units import PAPERS, unit_named
-from rsea_ros.model.train import TRAINS
+from rsea_ros.model.train import PARTS, TRAINS
 from rsea_ros.outputs.new_files import NewFiles
 from rsea_ros.report import words
 from rsea_ros.report.result_files import DESIGN_JSON, REPORT, json_text
@@ -20,7 +21,7 @@ EXAMPLE = "rsea design --torque 200 --bandwidth 50 --inertia 0.01"
 DEMANDS = {
     "torque": "largest torque, N·m (default %(default)s)",
     "bandwidth": "bandwidth, Hz (default %(default)s)",
-    "inertia": "inertia of the spring chassis, kg·m² (default %(default)s)",
+    "inertia": "inertia of the part beside the spring, kg·m² (default %(default)s)",
     "mass": "mass of the chassis, kg (default %(default)s)",
     "diameter": "diameter of the chassis, m (default %(default)s)",
     "separation": "distance between two springs, m (default %(default)s)",
@@ -42,6 +43,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--stiffness", type=float, help=about)
     add("--unit", default=PAPERS, help="motor-gear unit of the catalogue (default %(default)s)")
     add("--train", choices=TRAINS, help="gear train, if it differs from that of the unit")
+    about = "the part beside the spring; housing: held by the gear output, an RT-RSEA (default %(default)s)"
+    add("--beside-spring", choices=PARTS, default=PARTS[0], help=about)
     about = "YAML of motor-gear units (default config/design/motor_gear_units.yaml)"
     add("--catalogue", type=path, help=about)
     _output.add_results(parser, f"{DESIGN_JSON} and {REPORT}", "out/design")
@@ -58,6 +61,7 @@ def run(args: argparse.Namespace) -> int:
     requirement = Requirement(**{**values, "deflection": math.radians(args.deflection)})
     unit = unit_named(args.unit, args.catalogue)
     unit = unit.with_train(args.train) if args.train else unit
+    unit = replace(unit, beside_spring=args.beside_spring)
     least = springs.spring_design(requirement, unit, springs.least_stiffness(requirement, unit))
     asked = least
     stated = STIFFNESS if args.stiffness is None and requirement == Requirement() else args.stiffness

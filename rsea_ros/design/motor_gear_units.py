@@ -18,7 +18,7 @@ from rsea_ros.documents.units import plain
 from rsea_ros.documents.wording import did_you_mean, quote
 from rsea_ros.errors import FieldError, ParameterError
 from rsea_ros.model.rig_file import rig_folders
-from rsea_ros.model.train import TRAINS, Train, rotor_turns, spin_inertia
+from rsea_ros.model.train import TRAINS, Part, Train, rotor_turns, spin_inertia
 
 FILE = "motor_gear_units.yaml"
 UNITS: Mapping[str, str] = {
@@ -44,6 +44,7 @@ class MotorGear:
 
     trains: that of the unit, then the others that its sources allow. values: SI by name of UNITS. spreads:
     relative, one sigma, of those that are uncertain. sources: where each value and the train come from.
+    beside_spring: the part that turns the spring (model/train.py).
     """
 
     name: str
@@ -52,6 +53,7 @@ class MotorGear:
     values: Mapping[str, float]
     spreads: Mapping[str, float]
     sources: Mapping[str, str]
+    beside_spring: Part = "chassis"
 
     def __getitem__(self, name: str) -> float:
         return self.values[name]
@@ -67,13 +69,13 @@ class MotorGear:
 
     @property
     def turns(self) -> float:
-        """Return n, the rotor's turns for one of the output, both against the housing."""
-        return rotor_turns(self.train, self["ratio"])
+        """Return n, the rotor's turns for one of the part beside the spring."""
+        return rotor_turns(self.train, self["ratio"], self.beside_spring)
 
     @property
     def spin(self) -> float:
         """The rotor's addition to J_sc between the two ends, kg m^2; negative where it turns backward."""
-        return spin_inertia(self.train, self["ratio"], self["reflected_inertia"])
+        return spin_inertia(self.train, self["ratio"], self["reflected_inertia"], self.beside_spring)
 
     @property
     def rotor_spread(self) -> float:

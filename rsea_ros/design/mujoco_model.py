@@ -66,6 +66,9 @@ class Mesh:
 
 def mesh_of(rig: Rig) -> Mesh:
     """Return the mesh of a rig's train. Raises RigError for a lumped one, which no mechanism is."""
+    if rig.beside_spring != "chassis":
+        what = f"rig {rig.name}: beside_spring = {rig.beside_spring}"
+        raise RigError(f"{what} cannot be exported, expected chassis", "beside_spring")
     ratio = rig["gear.ratio"]
     match rig.train:
         case "planetary":

@@ -160,6 +160,7 @@ def rig_of(requirement: Requirement, unit: MotorGear, stiffness: float) -> Rig:
         quantities={name: Quantity(value) for name, value in values.items()},
         clamped=frozenset(END_NAMES),
         train=unit.train,
+        beside_spring=unit.beside_spring,
     )
 
 

@@ -80,8 +80,8 @@ class Mechanics:
 
 
 def train_ratio(rig: Rig) -> float:
-    """Return n, the rotor's turns for one of the gear output, both against the housing."""
-    return rotor_turns(rig.train, rig["gear.ratio"])
+    """Return n, the rotor's turns for one of the part beside the spring, both against the other part."""
+    return rotor_turns(rig.train, rig["gear.ratio"], rig.beside_spring)
 
 
 def rotor_inertia(rig: Rig) -> float:

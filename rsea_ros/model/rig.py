@@ -15,7 +15,7 @@ from typing import Literal
 from rsea_ros.documents.units import plain, with_unit
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.errors import RigError
-from rsea_ros.model.train import TRAINS, Train
+from rsea_ros.model.train import PARTS, TRAINS, Part, Train
 from rsea_ros.records.record import FloatArray
 
 LEAST_SIZE, GREATEST_SIZE = 1e-12, 1e12
@@ -190,16 +190,17 @@ class PositionLoop:
 class Rig:
     """A description of a bench. See the module docstring.
 
-    linear: linear motion; m, N and kg replace rad, N m and kg m^2.
-    other_trains: other possible gear trains. known: names that no fit may change. proximal: the end that the
-    paper calls *proximal*. ft_end: the end with the F/T sensor; at the housing end it measures the proximal
-    spring, between housing and that end. encoder_end: the part that the encoder measures against the housing:
-    the gear output, or the spring end behind backlash and spring. motion: `measured` where something else
-    moves the output: then torques are judged along the measured motion (model/inverse.py). loop: kind of the
-    position loop whose targets command the bench, a key of LOOP_FIELDS; its gains are among the quantities.
-    controller: a loop that added its torque to the command of the record. hold: the command between two
-    samples: the first of them, a line between them, or the band-limited curve of an analogue command sampled
-    behind a filter.
+    linear: linear motion; m, N and kg replace rad, N m and kg m^2. other_trains: other possible gear
+    trains. beside_spring: which part turns the spring (train.py); position and motor torque are those of
+    that part against the other, chassis.inertia is its. known: names that no fit may change. proximal: the
+    end that the paper calls *proximal*. ft_end: the end with the F/T sensor; at the housing end it measures
+    the proximal spring, between housing and that end. encoder_end: the part that the encoder measures
+    against the housing: the gear output, or the spring end behind backlash and spring. motion: `measured`
+    where something else moves the output: then torques are judged along the measured motion
+    (model/inverse.py). loop: kind of the position loop whose targets command the bench, a key of
+    LOOP_FIELDS; its gains are among the quantities. controller: a loop that added its torque to the command
+    of the record. hold: the command between two samples: the first of them, a line between them, or the
+    band-limited curve of an analogue command sampled behind a filter.
     """
 
     name: str
@@ -209,6 +210,7 @@ class Rig:
     linear: bool = False
     train: Train = "planetary"
     other_trains: tuple[Train, ...] = ()
+    beside_spring: Part = "chassis"
     sensors: Mapping[str, Sensor] = field(default_factory=dict)
     known: frozenset[str] = frozenset()
     proximal: str = "housing_end"
@@ -360,6 +362,11 @@ def _check_trains(rig: Rig) -> None:
     for train in rig.other_trains:
         if train not in TRAINS:
             raise RigError(f"rig {rig.name}: gear.or has {train!r}, {expected}", "gear.or")
+    if rig.beside_spring not in PARTS:
+        raise RigError(
+            f"rig {rig.name}: beside_spring = {rig.beside_spring!r}, expected {' or '.join(PARTS)}",
+            "beside_spring",
+        )
 
 
 def _check_sensor_end(rig: Rig) -> None:

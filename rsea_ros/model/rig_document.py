@@ -6,7 +6,7 @@ A value is written `{value: 0.953, unit: kg m^2, spread: 0.3, source: Table 2}`;
 
 import math
 from collections.abc import Collection, Mapping, Sequence
-from typing import Any
+from typing import Any, TypeVar
 
 from rsea_ros.documents.strict_yaml import (
     NEEDED,
@@ -35,7 +35,6 @@ from rsea_ros.model.rig import (
     LOOP_FIELDS,
     EffectSetting,
     Field,
-    Hold,
     PositionLoop,
     Quantity,
     Rig,
@@ -43,9 +42,10 @@ from rsea_ros.model.rig import (
     check_value,
     loop_names,
 )
-from rsea_ros.model.train import TRAINS
+from rsea_ros.model.train import PARTS, TRAINS
 from rsea_ros.records.record import MEASURED, UNITS
 
+T = TypeVar("T")
 _END = {
     "inertia": "inertia of the load",
     "damping": "viscous damping of the load",
@@ -88,6 +88,7 @@ TOP = (
     Key("source", "text", "empty", "source of its values"),
     Key("proximal", "`housing_end` or `spring_end`", "`housing_end`", "the paper's proximal end"),
     Key("encoder_end", "`gear_output` or `spring_end`", "`gear_output`", "the part that the encoder reads"),
+    Key("beside_spring", "`chassis` or `housing`", "`chassis`", "housing: held by the gear output (RT-RSEA)"),
     Key("ft_end", "`housing_end` or `spring_end`", "`spring_end`", "the end that carries the F/T sensor"),
     Key("motion", "`simulated` or `measured`", "`simulated`", "measured: something else moves the output"),
     Key("linear", "true or false", "false", "m, N, kg replace rad, N·m, kg·m²"),
@@ -305,12 +306,13 @@ def _rig(document: Mapping[str, Any], default_name: str) -> Rig:
             [*quantities, *(f"{e.name}.{p}" for e in effects for p in e.parameters)],
         ),
         proximal=text(document.get("proximal", "housing_end"), "proximal"),
+        beside_spring=_one_of(PARTS, document, "beside_spring"),
         ft_end=text(document.get("ft_end", "spring_end"), "ft_end"),
         encoder_end=text(document.get("encoder_end", "gear_output"), "encoder_end"),
         motion=text(document.get("motion", "simulated"), "motion"),
         loop=loop,
         controller=None if loop else _controller(document.get("controller")),
-        hold=_hold(document.get("hold", "zero")),
+        hold=_one_of(HOLDS, document, "hold"),
         effects=effects,
     )
 
@@ -361,11 +363,13 @@ def _loop(item: Any) -> tuple[str | None, dict[str, Quantity]]:
     return kind, {f"controller.{key}": _quantity(f"controller.{key}", item[key]) for key in names_of}
 
 
-def _hold(item: Any) -> Hold:
-    for hold in HOLDS:
-        if item == hold:
-            return hold
-    raise RigError(f"hold = {quote(item)}, expected {', '.join(HOLDS)}", "hold")
+def _one_of(choices: Sequence[T], document: Mapping[str, Any], key: str) -> T:
+    """Return the stated one of some choices, or the first of them."""
+    item = document.get(key, choices[0])
+    for choice in choices:
+        if item == choice:
+            return choice
+    raise RigError(f"{key} = {quote(item)}, expected {', '.join(map(str, choices))}", key)
 
 
 def _controller(item: Any) -> PositionLoop | None:

@@ -32,6 +32,8 @@ def rig_to_document(rig: Rig) -> dict[str, Any]:
         document["ft_end"] = rig.ft_end
     if rig.encoder_end != "gear_output":
         document["encoder_end"] = rig.encoder_end
+    if rig.beside_spring != "chassis":
+        document["beside_spring"] = rig.beside_spring
     if rig.motion != "simulated":
         document["motion"] = rig.motion
     if rig.loop:

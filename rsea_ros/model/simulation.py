@@ -313,7 +313,7 @@ def build(rig: Rig, step: float, duration: float, *, in_loop: bool = False) -> M
     active = [(e, p) for e, p in settings if e.port != st.Port.STRUCTURE]
     _check_sensor(rig, active)
     reads = frozenset(r for e, _ in active for r in e.reads)
-    ends = rig.clamped, rig.proximal, rig.ft_end, rig.encoder_end
+    ends = rig.clamped, rig.proximal, rig.ft_end, rig.encoder_end, rig.beside_spring
     body = _Body(rig, (*rig.values().items(), *ends, rig.train, rig.rigid_spring, rig.linear))
     linear, hanging, start_maps = _linear_part(body, step, reads)
     calls, states = _calls(rig, active, in_loop)

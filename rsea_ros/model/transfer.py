@@ -169,8 +169,8 @@ def inner_inertia(rig: Rig) -> float:
     n J_r is the spin of the rotor, which Eqs. (5) to (7) leave out: J_m / N for a planetary train, negative
     where the rotor turns against the output (train.py). A lumped rotor counts with the whole J_m.
     """
-    spin = spin_inertia(rig.train, rig["gear.ratio"], rig["rotor.reflected_inertia"])
-    return rig["chassis.inertia"] + spin
+    reflected = rig["rotor.reflected_inertia"]
+    return rig["chassis.inertia"] + spin_inertia(rig.train, rig["gear.ratio"], reflected, rig.beside_spring)
 
 
 def undamped_band(stiffness: float | FloatArray, inertia: float | FloatArray) -> FloatArray:

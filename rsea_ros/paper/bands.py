@@ -1,9 +1,10 @@
 """Up to which frequency and amplitude an actuator is a pure torque source: Eq. (7) and the exact bands.
 
-And the same actuator held by either end, with any train, lumped or not. With both ends clamped, n the train's
-ratio, J_r = J_m / N^2 and Z = J s^2 + b_s s + K_s:
+And the same actuator held by either end, with any train, lumped or not. With both ends clamped, n the rotor's
+turns for one of the part beside the spring (the gear in a T-RSEA, the motor's housing in an RT-RSEA, where n
+is 1 less that of the train), J_sc that part's inertia, J_r = J_m / N^2 and Z = J s^2 + b_s s + K_s:
 
-    T_d / T_m = (b_s s + K_s) / den       T-RSEA, the gear beside the spring; RT-RSEA exchanges T_d and T_p
+    T_d / T_m = (b_s s + K_s) / den
     T_p / T_m = Z(J_inner) / den          J_inner = J_sc + n J_r   (lumped: J_sc + n^2 J_r)
     den = (J_sc + n^2 J_r) s^2 + (b_m + b_s) s + K_s
 """
@@ -15,9 +16,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rsea_ros.design.spring_design import band_range
-from rsea_ros.model.equations import rotor_inertia, train_ratio
+from rsea_ros.model.equations import gear_inertia, train_ratio
 from rsea_ros.model.rig import END_NAMES, Rig
-from rsea_ros.model.train import TRAINS, Train
+from rsea_ros.model.train import PARTS, TRAINS, Part, Train
 from rsea_ros.model.transfer import (
     end_response,
     end_to_end,
@@ -82,12 +83,17 @@ HZ: FloatArray = np.geomspace(0.5, 140.0, 60)
 
 @dataclass(frozen=True)
 class Arrangement:
-    """A train with both ends clamped. ratio: n. outer, inner: kg m^2 of den and of T_p's numerator."""
+    """A train with both ends clamped. ratio: n. outer, inner: kg m^2 of den and of T_p's numerator.
 
+    band: undamped, up to where T_d/T_p is within 3 dB, Hz.
+    """
+
+    beside_spring: Part
     train: Train
     ratio: float
     outer: float
     inner: float
+    band: float
 
 
 @dataclass(frozen=True)
@@ -101,11 +107,13 @@ class Limit:
 
 
 def arrangements(rig: Rig) -> tuple[Arrangement, ...]:
-    """Return the rig's inertias with each train."""
-    turned = [replace(rig, train=train) for train in TRAINS]
-    outer = [r["chassis.inertia"] + train_ratio(r) ** 2 * rotor_inertia(r) for r in turned]
+    """Return the rig's inertias with each train, and with either part beside the spring."""
+    turned = [replace(rig, train=t, beside_spring=p) for p in PARTS for t in TRAINS]
+    inertias = [(r["chassis.inertia"] + gear_inertia(r), inner_inertia(r)) for r in turned]
+    k_s = rig["spring.stiffness"]
     return tuple(
-        Arrangement(r.train, train_ratio(r), j, inner_inertia(r)) for r, j in zip(turned, outer, strict=True)
+        Arrangement(r.beside_spring, r.train, train_ratio(r), *both, float(undamped_band(k_s, both[1])))
+        for r, both in zip(turned, inertias, strict=True)
     )
 
 

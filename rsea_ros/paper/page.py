@@ -245,6 +245,9 @@ def bands_table(actuators: Mapping[str, Bands]) -> html.Html:
     )
 
 
+NAMES = {"chassis": "chassis (T-RSEA)", "housing": "housing (RT-RSEA)"}
+
+
 def arrangements_table(rows: Sequence[Arrangement], limits: Sequence[Limit]) -> html.Html:
     """Return transfer functions and limits of all arrangements."""
 
@@ -254,12 +257,12 @@ def arrangements_table(rows: Sequence[Arrangement], limits: Sequence[Limit]) -> 
 
     shown = html.listed(
         rows,
+        ("Beside the spring", lambda r: NAMES[r.beside_spring]),
         ("Train", lambda r: words.train(r.train)),
         ("#n", lambda r: words.signed_text(r.ratio, 0)),
         ("#J_out, kg·m²", lambda r: f"{r.outer:.4f}"),
         ("#J_in, kg·m²", lambda r: words.signed_text(r.inner, 5)),
-        ("T-RSEA", lambda r: "T_d/T_m = (b_s s + K_s)/den"),
-        ("", lambda r: "T_p/T_m = (J_in s² + b_s s + K_s)/den"),
+        ("#±3 dB, Hz", lambda r: words.hertz(r.band)),
     )
     reached = html.listed(
         limits,
@@ -272,13 +275,15 @@ def arrangements_table(rows: Sequence[Arrangement], limits: Sequence[Limit]) -> 
         "T-RSEA and RT-RSEA, every train, lumped and unlumped: one table",
         html.equation(
             "den = J_out s² + (b_m + b_s) s + K_s\nJ_out = J_sc + n² J_r      J_in = J_sc + n J_r "
-            "(lumped: J_out)      J_r = J_m/N²"
+            "(lumped: J_out)      J_r = J_m/N²\nT_d/T_m = (b_s s + K_s)/den      "
+            "T_p/T_m = (J_in s² + b_s s + K_s)/den"
         ),
         shown,
         html.Html("<h3>Limits</h3>"),
         reached,
-        caption="Both ends clamped, the platform's values. An RT-RSEA is the same machine held by the other "
-        "end: T_d and T_p change places.",
+        caption="Both ends clamped, the platform's values, J_sc the inertia of the part beside the spring. "
+        "An RT-RSEA is held by its gear's output: the rotor turns 1 − n times for one turn of the housing, "
+        "so its spin changes sign, and with it which inertia beside the spring gives the widest band.",
     )
 
 

@@ -9,6 +9,7 @@ import pytest
 
 from rsea_ros.design.motor_gear_units import unit_named
 from rsea_ros.model import outputs
+from rsea_ros.model.rig import END_NAMES
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.train import TRAINS
 from rsea_ros.model.transfer import frequency_response
@@ -91,17 +92,17 @@ def test_the_papers_1e8_is_as_good_as_a_clamp():
     assert clamp_error() < 1e-6
 
 
-@pytest.mark.parametrize("held", ["T-RSEA", "RT-RSEA"])
-@pytest.mark.parametrize("index", range(len(TRAINS)), ids=TRAINS)
-def test_the_table_has_the_right_transfer_functions(index, held):
+@pytest.mark.parametrize("proximal", END_NAMES)
+@pytest.mark.parametrize("index", range(2 * len(TRAINS)))
+def test_the_table_has_the_right_transfer_functions(index, proximal):
     rig = load_rig("paper_high_impedance")
     row = arrangements(rig)[index]
-    rig = replace(rig, train=row.train, proximal="housing_end" if held == "T-RSEA" else "spring_end")
+    rig = replace(rig, train=row.train, beside_spring=row.beside_spring, proximal=proximal)
     s = 2j * np.pi * HZ
     den = row.outer * s**2 + (23.088 + 3.0) * s + 1530.456
     expected = [(3.0 * s + 1530.456) / den, (row.inner * s**2 + 3.0 * s + 1530.456) / den]
     torques = [outputs.distal(rig), outputs.proximal(rig)]
-    for torque, value in zip(torques, expected if held == "T-RSEA" else expected[::-1], strict=True):
+    for torque, value in zip(torques, expected if proximal == "housing_end" else expected[::-1], strict=True):
         np.testing.assert_allclose(frequency_response(rig, torque, HZ), value, rtol=1e-9)
 
 
