@@ -90,6 +90,7 @@ RIGHT: Mapping[str, tuple[str, ...]] = {
     "gear_compliance": ("the load, at the encoder", "command's past"),
     "gravity_error": ("the load's angle", "position"),
     "hard_stop": ("deflection",),
+    "gear_loss": ("speed and command",),
     "load_dependent_friction": ("speed and load",),
     "lopsided_spring": ("deflection",),
     "lugre_friction": ("speed", "position's past"),

@@ -46,6 +46,10 @@ LAWS: Mapping[str, tuple[str, str]] = {
         "friction", "torque += (fabs({motor_coefficient} * motor + {load_coefficient} * load)"
         " + (motor * load > 0.0) * {quadratic} * fmin(motor * motor, load * load))" + _SIGN,
     ),
+    "gear_loss": (
+        "friction", f"torque += {{mean}} * fabs(motor) * tanh(velocity / {PRESLIDING.typical})"
+        " + {difference} * motor",
+    ),
     "quadratic_drag": ("friction", "torque += {coefficient} * velocity * fabs(velocity)"),
     "torque_ripple": (
         "ripple", "torque -= {amplitude} * sin({cycles_per_revolution} * turns * position + {phase})",
