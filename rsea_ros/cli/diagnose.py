@@ -37,6 +37,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     about = "a run of the machine after one cause was taken out of it: is it predicted without that cause?"
     add("--edited", metavar="BAG", help=about)
     add("--without-cause", metavar="EFFECT", help="the cause that was taken out of the machine of --edited")
+    about = "add the smallest size of each effect that these runs would have shown: does the alarm work?"
+    add("--smallest", action="store_true", help=about)
     _output.add_results(parser, ", ".join(DIAGNOSIS), "out/diagnose-BAG")
     about = "effects to leave out of the search"
     add("--without", nargs="+", action="extend", default=[], metavar="EFFECT", help=about)
@@ -70,6 +72,11 @@ def run(args: argparse.Namespace) -> int:
         settings = DiagnosisSettings(args.max_causes, tuple(effect_named(name).name for name in args.without))
         choice = _topics.rig_choice(args)
         result = replace(diagnose(records, rig, holdout, tell, settings), rig_choice=choice)
+        if args.smallest:
+            from rsea_ros.diagnosis.smallest_change import smallest_changes
+
+            tell("looking for the smallest changes", 0.98)
+            result = replace(result, smallest=smallest_changes(result, records))
         refused: ParameterError | None = None
         if changed is not None:
             from rsea_ros.diagnosis.edit import edited

@@ -191,6 +191,16 @@ SAME = 1.2
 
 
 @dataclass(frozen=True)
+class SmallestChange:
+    """The size, in `unit`, of an effect that a recording would just have shown; NaN for none within reach."""
+
+    name: str
+    parameter: str
+    value: float
+    unit: str
+
+
+@dataclass(frozen=True)
 class Spectrum:
     """Amplitude spectral densities of a channel's residual: Hz; unit/sqrt(Hz)."""
 
@@ -244,6 +254,7 @@ class Diagnosis:
     settings: DiagnosisSettings = DEFAULT
     rig_choice: RigChoice = field(default_factory=RigChoice)
     edit: Edit | None = None
+    smallest: tuple[SmallestChange, ...] = ()
 
     @property
     def why_stopped(self) -> Literal["only_noise", "most_causes", "nothing_better"]:

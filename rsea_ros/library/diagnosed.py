@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rsea_ros.diagnosis.result import Alternative, Cause, Diagnosis, Edit
+from rsea_ros.diagnosis.result import Alternative, Cause, Diagnosis, Edit, SmallestChange
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig, save_rig
 from rsea_ros.progress import Progress
@@ -64,6 +64,12 @@ class Diagnosed:
         from rsea_ros.diagnosis.edit import edited
 
         return edited(self.result, record, without_cause)
+
+    def smallest_changes(self) -> tuple[SmallestChange, ...]:
+        """Return the smallest size of each effect beyond the model that the first record would have shown."""
+        from rsea_ros.diagnosis.smallest_change import smallest_changes
+
+        return smallest_changes(self.result, [self.record])
 
     def summary(self) -> str:
         """Return the verdict and the evidence as plain text."""

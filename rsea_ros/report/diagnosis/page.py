@@ -50,6 +50,8 @@ def _blocks(d: Diagnosis) -> Iterator[html.Block]:
     yield from (_cause(c, d) for c in d.causes)
     if d.edit is not None:
         yield html.section("The edited machine", words.sentence(f"{say.edit_sentence(d.edit)}."))
+    if d.smallest:
+        yield _smallest(d)
     together = " together with the causes" if d.causes else ""
     yield html.section(f"Values of the rig{together}", parameter_table(d.final))
     yield _tried(d)
@@ -122,6 +124,22 @@ def _tried(d: Diagnosis) -> html.Html:
         html.bullets(reasons),
         caption="Gain: share of the residual that the cause removes, on held-out data.",
     )
+
+
+def _smallest(d: Diagnosis) -> html.Html:
+    """Return the smallest size of each effect that the recording would have shown."""
+    shown = html.listed(
+        d.smallest,
+        ("Effect", lambda s: html.named(words.sentence(words.effect(s.name)), s.name)),
+        ("Size", lambda s: s.parameter.replace("_", " ")),
+        ("#Shown from", lambda s: say.size_text(s)),
+    )
+    return html.section(
+        "The smallest changes that this recording would have shown", shown,
+        caption="Each is put into the model and grown until a channel's residual is 4 % above its noise, "
+        "although every value of the fit answers it; half as large again it is found. At no size: the fit "
+        "answers it.",
+    )  # fmt: skip
 
 
 def _channels(d: Diagnosis) -> html.Html:
@@ -256,6 +274,7 @@ def diagnosis_json(diagnosis: Diagnosis) -> dict[str, Any]:
             **pick(d, "residual_rms=extended_residual_rms fit_percent=extended_fit_percent at_noise_floor"),
             "misfit": [pick(m, misfit) for m in d.remaining],
         },
+        "smallest_changes": [pick(s, "name parameter value unit") for s in d.smallest],
         "nuisance": [
             {**pick(p, "name value unit stated=start spreads_off"), "at_bound": p.name in stuck}
             for p in d.final if p.value != p.start

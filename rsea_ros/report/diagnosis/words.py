@@ -327,6 +327,12 @@ def edit_sentence(e: results.Edit) -> str:
     )
 
 
+def size_text(s: results.SmallestChange) -> str:
+    """Return the size of the smallest change with its unit; no size shows where a fit answers it."""
+    digits = 4 if abs(s.value - 1.0) < 0.1 else 2  # a gain
+    return words.quantity(s.value, s.unit, digits) if math.isfinite(s.value) else "at no size"
+
+
 def _rows(d: Diagnosis, unclear: Sequence[str]) -> Iterator[tuple[str, str]]:
     main = d.channel
     unit = in_motion(UNITS[main], linear=d.baseline_rig.linear)
@@ -345,6 +351,9 @@ def _rows(d: Diagnosis, unclear: Sequence[str]) -> Iterator[tuple[str, str]]:
         yield "status", status_line(cause, d.alternatives, d.at_noise_floor)
     if d.edit is not None:
         yield "edited", edit_sentence(d.edit)
+    if d.smallest:
+        every = [f"{s.name} {size_text(s)}" for s in d.smallest if math.isfinite(s.value)]
+        yield "would show", ", ".join(every).replace("_", " ")
     if d.misfit and d.verdict != "nothing_wrong":
         worst: dict[str, results.Misfit] = {}  # in each respect
         for m in sorted(d.misfit, key=lambda m: -m.times_noise):
