@@ -153,19 +153,13 @@ def add_runs(
 def add_conditions(parser: argparse.ArgumentParser) -> None:
     """Declare --conditions."""
     about = "YAML file: what is known to differ between the runs, such as a payload (docs/rig.md)"
-    parser.add_argument("--conditions", metavar="FILE", help=about)
+    parser.add_argument("--conditions", nargs=1, default=(), metavar="FILE", help=about)
 
 
 def rig_of(args: argparse.Namespace, *others: str | None) -> Rig:
     """Return the rig of a verb with --conditions. others: runs beside its bags."""
-    rig = load_rig(args.rig)
-    names = [PurePath(run).name for run in (*args.bags, *others) if run]
-    return rig if args.conditions is None else load_conditions(args.conditions, rig, names)
-
-
-def files_of(args: argparse.Namespace) -> list[str]:
-    """Return the bags of a verb with --conditions, and that file, if it was given."""
-    return [*args.bags, *([args.conditions] if args.conditions else [])]
+    rig, names = load_rig(args.rig), [PurePath(run).name for run in (*args.bags, *others) if run]
+    return load_conditions(args.conditions[0], rig, names) if args.conditions else rig
 
 
 def rig_choice(args: argparse.Namespace) -> RigChoice:
@@ -176,7 +170,7 @@ def rig_choice(args: argparse.Namespace) -> RigChoice:
     keep = ("--keep-rows",) if args.keep_rows else ()
     shifts = (f"--shift={shift}" for shift in args.shift)
     part = (*_given(args, dict.fromkeys(("begin", "end", "window"))), *shifts, *keep)
-    conditions = getattr(args, "conditions", None) or ""
+    conditions = "".join(getattr(args, "conditions", ()))
     return RigChoice(args.rig, isinstance(args.rig, _Default), topics, part, conditions)
 
 

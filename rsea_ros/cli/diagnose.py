@@ -50,7 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     if bool(args.edited) != bool(args.without_cause) or args.edited == "":
         raise ParameterError("--edited BAG and --without-cause EFFECT: one is given, expected both or none")
-    files, default = _topics.files_of(args), f"diagnose-{Path(args.bags[0]).stem}"
+    files, default = [*args.bags, *args.conditions], f"diagnose-{Path(args.bags[0]).stem}"
     inputs = [*files, args.rig, args.holdout, args.edited]
     place = _output.results_place(args, Path("out") / default, DIAGNOSIS, inputs)
     rig, topics = _topics.rig_of(args, args.holdout, args.edited), _topics.topic_map(args)

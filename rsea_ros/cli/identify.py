@@ -31,7 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     default = Path("out") / f"identify-{Path(args.bags[0]).stem}"
-    files = _topics.files_of(args)
+    files = [*args.bags, *args.conditions]
     place = _output.results_place(args, default, IDENTIFICATION, [*files, args.rig])
     rig, topics = _topics.rig_of(args), _topics.topic_map(args)
     with progress("identify") as tell:

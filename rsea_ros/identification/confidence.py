@@ -176,20 +176,15 @@ def stated_differences(problem: Problem) -> tuple[Remark, ...]:
     """Return a remark for each record that differs as stated, and one on conditions of other records."""
     here = {PurePath(case.source).name for case in problem.cases}
     others = tuple(c.record for c in problem.rig.conditions if c.record not in here)
-    remarks = [
-        Remark("differs", (
-            c.record,
-            *(f"{n} fitted for it alone" if q.spread else f"{n} = {_amount(n, q.value)}"
-              for n, q in c.values.items()),
-            *(f"{n} larger by {_amount(n, value)}" for n, value in c.added.items()),
-            *(f"no {name}" for name in sorted(c.without)),
-        )) for c in problem.rig.conditions if c.record in here
-    ]  # fmt: skip
-    return (*(r for r in remarks if len(r.names) > 1), *([Remark("other_records", others)] if others else []))
-
-
-def _amount(name: str, value: float) -> str:
-    return with_unit(f"{value:.4g}", FIELDS[name].unit)
+    remarks = []
+    for c in (c for c in problem.rig.conditions if c.record in here):
+        known = {f"{n} =": (n, q.value) for n, q in c.values.items() if not q.spread}
+        known |= {f"{n} larger by": (n, value) for n, value in c.added.items()}
+        told = [f"{how} {with_unit(f'{v:.4g}', FIELDS[n].unit)}" for how, (n, v) in known.items()]
+        told += [f"{n} fitted for it alone" for n, q in c.values.items() if q.spread]
+        told += [f"no {name}" for name in sorted(c.without)]
+        remarks += [Remark("differs", (c.record, *told))] if told else []
+    return (*remarks, *([Remark("other_records", others)] if others else []))
 
 
 def _without_the_rest(information: FloatArray, index: Sequence[int]) -> FloatArray:

@@ -149,7 +149,7 @@ class Unknown:
 def unknowns_of_rig(rig: Rig) -> tuple[Unknown, ...]:
     """Return the values of the rig that a fit may move, of single records too, with spreads as priors."""
     shared = {n: rig.quantities[n] for n in rig.free()}
-    own = {n: q for n, q in rig.of_records().items() if q.spread > 0.0}
+    own = {n: q for n, q in rig.of_records().items() if q.spread > 0.0 and field_of(n) not in rig.known}
     return tuple(_rig_unknown(name, quantity) for name, quantity in {**shared, **own}.items())
 
 

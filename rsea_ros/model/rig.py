@@ -375,11 +375,10 @@ def check_structure(rig: Rig) -> None:
     for end in set(rig.clamped) - set(END_NAMES):
         raise RigError(f"rig {rig.name}: clamped end {end!r}, expected one of {', '.join(END_NAMES)}")
     _check_trains(rig)
-    _check_sensor_end(rig)
+    _check_ends(rig)
     _check_spring(rig)
     for name in ("rotor.reflected_inertia", "rotor.reflected_damping"):
         rig[name]
-    _check_encoder_end(rig)
     _check_loop(rig)
     for end in END_NAMES:
         if rig.end_is_free(end):
@@ -401,10 +400,11 @@ def _check_trains(rig: Rig) -> None:
             raise RigError(f"rig {rig.name}: gear.or has {train!r}, {expected}", "gear.or")
 
 
-def _check_sensor_end(rig: Rig) -> None:
-    for key, end in (("proximal", rig.proximal), ("ft_end", rig.ft_end)):
-        if end not in END_NAMES:
-            raise RigError(f"rig {rig.name}: {key} = {end!r}, expected one of {', '.join(END_NAMES)}", key)
+def _check_ends(rig: Rig) -> None:
+    possible = {"proximal": END_NAMES, "ft_end": END_NAMES, "encoder_end": ("gear_output", "spring_end")}
+    for key, ends in possible.items():
+        if (end := getattr(rig, key)) not in ends:
+            raise RigError(f"rig {rig.name}: {key} = {end!r}, expected one of {', '.join(ends)}", key)
     if rig.ft_end == "housing_end" and math.isinf(rig["proximal_spring.stiffness"]):
         raise RigError(
             f"rig {rig.name}: ft_end = housing_end without proximal_spring.stiffness, expected that of the "
@@ -422,14 +422,6 @@ def _check_spring(rig: Rig) -> None:
         raise RigError(
             f"rig {rig.name}: spring.stiffness {value}, expected a value in N·m/rad or `rigid: true`",
             "spring.stiffness",
-        )
-
-
-def _check_encoder_end(rig: Rig) -> None:
-    if rig.encoder_end not in ("gear_output", "spring_end"):
-        raise RigError(
-            f"rig {rig.name}: encoder_end = {rig.encoder_end!r}, expected gear_output or spring_end",
-            "encoder_end",
         )
 
 

@@ -348,15 +348,14 @@ def _condition(item: Any, rig: Rig, records: Collection[str]) -> Condition:
     body = mapping(item, "condition", "a mapping with the key record")
     only_keys(body, names(CONDITION), "condition")
     record = text(body.get("record"), "record")
-    if record not in (records or [PurePath(record).name]):
+    if not record or record not in (records or [PurePath(record).name]):
         one = f"one of {', '.join(records)}" if records else "the last part of a record's path"
         raise RigError(f"record = {quote(record)}, expected {one}{did_you_mean(record, records)}")
     values, added = (_differences(body.get(key, {}), key) for key in ("values", "added"))
     separate, without = (sequence(body.get(key, []), key, "names") for key in ("separate", "without"))
-    for name in separate:
-        if name not in rig.free():
-            raise RigError(f"separate: {quote(name)}, expected a value that the rig states with a spread: "
-                           f"{', '.join(rig.free()) or 'it has none'}")  # fmt: skip
+    for name in (name for name in separate if name not in rig.free()):
+        free = ", ".join(rig.free()) or "it has none"
+        raise RigError(f"separate: {quote(name)}, expected a value that the rig states with a spread: {free}")
     stated = [*values, *added, *separate, *(n for n, q in added.items() if q.spread)]
     for name in stated:
         if stated.count(name) > 1:
@@ -368,11 +367,10 @@ def _condition(item: Any, rig: Rig, records: Collection[str]) -> Condition:
 
 
 def _differences(item: Any, key: str) -> dict[str, Quantity]:
-    body = mapping(item, key, "a mapping such as {spring_end.inertia: {value: …, unit: kg m^2}}")
-    for name in body:
-        if name not in FIELDS:
-            near = did_you_mean(str(name), FIELDS)
-            raise RigError(f"{key}: {quote(name)}, expected a value such as spring_end.inertia{near}")
+    body = mapping(item, key, "a mapping of GROUP.FIELD to {value: …, unit: …}")
+    for name in (name for name in body if name not in FIELDS):
+        near = did_you_mean(str(name), FIELDS)
+        raise RigError(f"{key}: {quote(name)}, expected a value such as spring_end.inertia{near}")
     return {name: _quantity(name, quantity) for name, quantity in body.items()}
 
 

@@ -26,12 +26,8 @@ def rig_to_document(rig: Rig) -> dict[str, Any]:
         "source": rig.source,
         "proximal": rig.proximal,
     }
-    if rig.linear:
-        document["linear"] = True
-    if rig.ft_end != "spring_end":
-        document["ft_end"] = rig.ft_end
-    if rig.encoder_end != "gear_output":
-        document["encoder_end"] = rig.encoder_end
+    usual = {"linear": False, "ft_end": "spring_end", "encoder_end": "gear_output"}
+    document |= {key: getattr(rig, key) for key, value in usual.items() if getattr(rig, key) != value}
     if rig.loop:
         document["controller"] = {"kind": rig.loop}
     if rig.hold != "zero":
