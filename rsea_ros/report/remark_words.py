@@ -98,7 +98,7 @@ _WORDS: Mapping[Code, str] = {
     "off_rig": "{name} differs from the rig: the rig states {stated} {unit}, the fit gives {fitted} {unit} "
     "(95 %), {spreads} of the stated spreads away.",
     "differs": "{name} differs as stated: {others}.",
-    "other_records": "The rig also has conditions of {names}, which are not among these records.",
+    "other_records": "Nothing was fitted to {names}, of which the rig has conditions too.",
     "stretches": "Models were fitted and tested on {v[0]:.0f} s of the {v[1]:.0f} s recorded: on stretches "
     "spread evenly, and on those that the nominal model simulates worst. The data were checked in full.",
     "lost_cycles": "{v[0]:.0f} lost cycles of the driver are a likely cause of the misfit: behind them the "

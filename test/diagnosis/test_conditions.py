@@ -159,7 +159,7 @@ def test_one_of_two_values_may_be_shared_and_those_of_others_stay_as_they_are():
     assert found.rig.of_records()[f"{INERTIA}@absent"].value == 0.11
     words = " ".join(remark_sentences(found.remarks))
     assert "long differs as stated: spring_end.inertia fitted for it alone." in words
-    assert "conditions of absent" in words
+    assert "Nothing was fitted to absent, of which the rig has conditions too." in words
 
 
 def test_a_cause_acts_only_where_it_was_not_removed():
