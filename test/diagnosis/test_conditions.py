@@ -124,6 +124,8 @@ def test_a_known_load_decides_between_gravity_and_a_torque_to_one_side():
     assert {p.name: p.value for p in alone.baseline}[GRAVITY] > 2.3, "gravity has taken it"
     both = diagnose([light, heavy], with_conditions(RIGID, [LOADED]), settings=settings)
     cause = only_cause(both)
+    said = "heavy differs as stated: spring_end.gravity = 4 N·m and spring_end.inertia larger by 0.1 kg·m²."
+    assert said in remark_sentences(both.remarks)
     assert (cause.name, cause.status) == ("asymmetric_friction", "confirmed")
     assert holds(cause.parameters["offset"], 0.2)
     assert holds(next(p for p in both.extended if p.name == GRAVITY), 2.0)
