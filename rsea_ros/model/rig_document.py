@@ -351,6 +351,8 @@ def _condition(item: Any, rig: Rig, records: Collection[str]) -> Condition:
     if not record or record not in (records or [PurePath(record).name]):
         one = f"one of {', '.join(records)}" if records else "the last part of a record's path"
         raise RigError(f"record = {quote(record)}, expected {one}{did_you_mean(record, records)}")
+    if list(records).count(record) > 1:
+        raise RigError(f"record = {quote(record)}: the name of several records, expected names that differ")
     values, added = (_differences(body.get(key, {}), key) for key in ("values", "added"))
     separate, without = (sequence(body.get(key, []), key, "names") for key in ("separate", "without"))
     for name in (name for name in separate if name not in rig.free()):

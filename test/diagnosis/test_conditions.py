@@ -18,6 +18,7 @@ from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.errors import FieldError
 from rsea_ros.identification.identify import identify
+from rsea_ros.identification.unknowns import unknowns_of_rig
 from rsea_ros.model.prediction_errors import predict
 from rsea_ros.model.rig_document import rig_from_document, with_conditions
 from rsea_ros.model.rig_file import load_rig, save_rig
@@ -177,13 +178,30 @@ def test_a_cause_acts_only_where_it_was_not_removed():
     assert not unstated.at_noise_floor, "one size for both records fits neither"
 
 
+def test_a_rig_under_a_condition_is_the_rig_of_that_record():
+    backlash = SPRUNG.with_effect("backlash", gap=1e-3)
+    differing = with_conditions(backlash, [LOADED, {"record": "repaired", "without": ["backlash"]}])
+    heavy, repaired = differing.under("runs/heavy/"), differing.under("repaired")
+    assert (heavy[INERTIA], heavy[GRAVITY], heavy.effects) == (pytest.approx(0.21), 4.0, backlash.effects)
+    assert repaired == SPRUNG
+    assert differing.under("runs/heavy/other") == backlash
+    assert backlash.under("heavy") is backlash
+    moved = differing.with_values({INERTIA: 0.2})
+    assert moved.under("heavy")[INERTIA] == pytest.approx(0.3), "a payload is on top of what a fit finds"
+    separate = with_conditions(SPRUNG, [{"record": "heavy", "separate": [INERTIA]}])
+    assert f"{INERTIA}@heavy" in {u.name for u in unknowns_of_rig(separate)}
+    known = replace(separate, known=frozenset({INERTIA}))
+    assert not {u.name for u in unknowns_of_rig(known)} & {INERTIA, f"{INERTIA}@heavy"}
+
+
 @pytest.mark.parametrize(
     ("items", "reason"),
     [
         (None, "conditions = None, expected a list"),
         ([], "condition = None, expected a mapping with the key record"),
         ([{"values": {}}], "record = None, expected text"),
-        ([{"record": "hevy"}], "record = 'hevy', expected one of light, heavy, did you mean heavy?"),
+        ([{"record": "hevy"}], "record = 'hevy', expected one of light, heavy, run, run, did you mean"),
+        ([{"record": "run"}], "record = 'run': the name of several records, expected names that differ"),
         ([{"record": "light"}, {"record": "light"}], "conditions[1]: record light is given twice"),
         ([{"record": "heavy", "mass": 1}], "unknown key 'mass', expected one of added, record, separate"),
         ([{"record": "heavy", "values": {"arm.inertia": 1.0}}], "values: 'arm.inertia', expected a value"),
@@ -198,7 +216,7 @@ def test_a_cause_acts_only_where_it_was_not_removed():
 )
 def test_a_condition_that_is_not_right_is_refused_in_one_line(items, reason):
     with pytest.raises(FieldError) as refused:
-        with_conditions(SPRUNG, items, ("light", "heavy"))
+        with_conditions(SPRUNG, items, ("light", "heavy", "run", "run"))
     assert reason in str(refused.value)
     assert "\n" not in str(refused.value)
 
