@@ -14,6 +14,7 @@ from independent.arms import NOISE, behind_spring, rigid
 from msg_adapters import write_record
 from rsea_ros.cli.main import main
 from rsea_ros.diagnosis.diagnose import diagnose
+from rsea_ros.diagnosis.edit import edited
 from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.errors import FieldError
@@ -174,6 +175,8 @@ def test_a_cause_acts_only_where_it_was_not_removed():
     cause = only_cause(found)
     assert (cause.name, cause.status, found.at_noise_floor) == ("coulomb_friction", "confirmed", True)
     assert holds(cause.parameters["torque"], 0.12)
+    edit = edited(found, records[0], "coulomb_friction")
+    assert edit.survived and edit.error_before > 10.0 * edit.error_after, "stated, it is tested all the same"
     unstated = diagnose(records, SPRUNG, settings=settings)
     assert not unstated.at_noise_floor, "one size for both records fits neither"
 
