@@ -51,6 +51,7 @@ def check_record(
     these data determine, and which are far off, as identify and diagnose do themselves.
     Raises nothing for data that are merely bad.
     """
+    rig = rig.under(record.source)
     with one_blas_thread(), np.errstate(all="ignore"):
         if rig.loop is not None and "reference" not in record:
             return Findings(record.source, rig.name, (_no_targets(record),), record.faults)

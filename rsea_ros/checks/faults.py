@@ -116,6 +116,7 @@ class Checked:
 
 def check(record: Record, rig: Rig) -> Checked:
     """Find and mask the faults of a record; a channel of one sample, or without a good one, is missing."""
+    rig = rig.under(record.source)
     few = {n: 1 if n in COMMANDS else 2 for n in record.channels}
     record = _without(record, {n for n, c in record.channels.items() if len(c) < few[n]})
     faults = [*record.faults, *(Fault("missing_topic", n, 1.0) for n in rig.sensors if n not in record)]

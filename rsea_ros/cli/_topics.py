@@ -5,11 +5,13 @@ import math
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from pathlib import PurePath
 
 from msg_adapters.topic_map import AXES, ROLES, TopicMap
 from rsea_ros.errors import ParameterError
 from rsea_ros.identification.result import Remark
-from rsea_ros.model.rig_file import RigChoice
+from rsea_ros.model.rig import Rig
+from rsea_ros.model.rig_file import RigChoice, load_conditions, load_rig
 from rsea_ros.records.record import Channel, Record
 
 
@@ -148,6 +150,18 @@ def add_runs(
     parser.add_argument("--rig", default=_Default(RIG), help=f"{rig} (default %(default)s)")
 
 
+def add_conditions(parser: argparse.ArgumentParser) -> None:
+    """Declare --conditions."""
+    about = "YAML file: what is known to differ between the runs, such as a payload (docs/rig.md)"
+    parser.add_argument("--conditions", nargs=1, default=(), metavar="FILE", help=about)
+
+
+def rig_of(args: argparse.Namespace, *others: str | None) -> Rig:
+    """Return the rig of a verb with --conditions. others: runs beside its bags."""
+    rig, names = load_rig(args.rig), [PurePath(run).name for run in (*args.bags, *others) if run]
+    return load_conditions(args.conditions[0], rig, names) if args.conditions else rig
+
+
 def rig_choice(args: argparse.Namespace) -> RigChoice:
     """Return how the rig and the data of a verb with --rig were chosen."""
     default = TopicMap()
@@ -156,7 +170,8 @@ def rig_choice(args: argparse.Namespace) -> RigChoice:
     keep = ("--keep-rows",) if args.keep_rows else ()
     shifts = (f"--shift={shift}" for shift in args.shift)
     part = (*_given(args, dict.fromkeys(("begin", "end", "window"))), *shifts, *keep)
-    return RigChoice(args.rig, isinstance(args.rig, _Default), topics, part)
+    conditions = "".join(getattr(args, "conditions", ()))
+    return RigChoice(args.rig, isinstance(args.rig, _Default), topics, part, conditions)
 
 
 def off_rig(remarks: Iterable[Remark]) -> list[str]:

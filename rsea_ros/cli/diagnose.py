@@ -16,7 +16,6 @@ from rsea_ros.diagnosis.settings import MOST_CAUSES, DiagnosisSettings
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.extent import bound_values
-from rsea_ros.model.rig_file import load_rig
 from rsea_ros.records.record import Record
 from rsea_ros.report.remark_words import command
 from rsea_ros.report.result_files import DIAGNOSIS, DIAGNOSIS_JSON, MODEL
@@ -33,6 +32,7 @@ _MUCH = 0.2
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     _topics.add_runs(parser, "several runs of one bench")
+    _topics.add_conditions(parser)
     add("--holdout", metavar="BAG", help="a run for testing only (default: a quarter of the runs, in blocks)")
     about = "a run of the machine after one cause was taken out of it: is it predicted without that cause?"
     add("--edited", metavar="BAG", help=about)
@@ -52,9 +52,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     if bool(args.edited) != bool(args.without_cause) or args.edited == "":
         raise ParameterError("--edited BAG and --without-cause EFFECT: one is given, expected both or none")
-    inputs, default = [*args.bags, args.rig, args.holdout, args.edited], f"diagnose-{Path(args.bags[0]).stem}"
+    files, default = [*args.bags, *args.conditions], f"diagnose-{Path(args.bags[0]).stem}"
+    inputs = [*files, args.rig, args.holdout, args.edited]
     place = _output.results_place(args, Path("out") / default, DIAGNOSIS, inputs)
-    rig, topics = load_rig(args.rig), _topics.topic_map(args)
+    rig, topics = _topics.rig_of(args, args.holdout, args.edited), _topics.topic_map(args)
     with _terminal.progress("diagnose") as tell:
         tell("reading", 0.0)
         runs = [*args.bags, *([args.holdout] if args.holdout else [])]
@@ -85,7 +86,7 @@ def run(args: argparse.Namespace) -> int:
                 result = replace(result, edit=edited(result, changed, without))
             except ParameterError as error:  # the diagnosis stands
                 refused = error
-        origin = _output.provenance("diagnose", args.bags, args.rig)
+        origin = _output.provenance("diagnose", files, args.rig)
         report = write_diagnosis(result, raw, place, write_overlay, origin)
     if args.json:
         _output.print_file(report.parent / DIAGNOSIS_JSON)

@@ -12,7 +12,6 @@ from rsea_ros.cli import _output, _terminal, _topics
 from rsea_ros.cli._terminal import progress, say
 from rsea_ros.cli.check import check_records
 from rsea_ros.identification.result import Identification, Verdict
-from rsea_ros.model.rig_file import load_rig
 from rsea_ros.report.remark_words import fault_lines, remark_sentences, right_rig, split_off_rig
 from rsea_ros.report.result_files import IDENTIFICATION, IDENTIFICATION_JSON, MODEL
 
@@ -22,6 +21,7 @@ EXAMPLE = "rsea identify run.mcap --rig my_bench.yaml --out results"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     _topics.add_runs(parser)
+    _topics.add_conditions(parser)
     _output.add_results(parser, ", ".join(IDENTIFICATION), "out/identify-BAG")
     _output.add_json(parser, IDENTIFICATION_JSON)
     findings = (*get_args(Verdict), _topics.OFF_RIG)
@@ -31,8 +31,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     default = Path("out") / f"identify-{Path(args.bags[0]).stem}"
-    place = _output.results_place(args, default, IDENTIFICATION, [*args.bags, args.rig])
-    rig, topics = load_rig(args.rig), _topics.topic_map(args)
+    files = [*args.bags, *args.conditions]
+    place = _output.results_place(args, default, IDENTIFICATION, [*files, args.rig])
+    rig, topics = _topics.rig_of(args), _topics.topic_map(args)
     with progress("identify") as tell:
         tell("reading", 0.0)
         bags = _topics.each_once(args.bags)
@@ -42,7 +43,7 @@ def run(args: argparse.Namespace) -> int:
         from rsea_ros.report.identification import write_results
 
         result = replace(identify(records, rig, tell), rig_choice=_topics.rig_choice(args))
-        report = write_results(result, place, _output.provenance("identify", args.bags, args.rig))
+        report = write_results(result, place, _output.provenance("identify", files, args.rig))
     if args.json:
         _output.print_file(report.parent / IDENTIFICATION_JSON)
     else:

@@ -12,6 +12,7 @@ import numpy as np
 from msg_adapters import read_record
 from rsea_ros.cli._output import add_force
 from rsea_ros.cli._topics import add_topic_options, cut, topic_map
+from rsea_ros.errors import ParameterError
 from rsea_ros.model.prediction_errors import Comparison, predict
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.outputs.new_files import check_free, write_file
@@ -27,6 +28,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("bag", help="rosbag2 directory, .mcap or .db3")
     about = "file for the predicted channels: t in s, then one column per channel in SI units"
     parser.add_argument("--out", metavar="CSV", help=about)
+    about = "record whose condition holds (default: the bag's own name)"
+    parser.add_argument("--condition", metavar="RECORD", help=about)
     parser.add_argument("--rig", action=_RigComesFirst, help=argparse.SUPPRESS)
     add_force(parser)
     parser.add_argument("--json", action="store_true", help="no effect: this verb always prints JSON")
@@ -50,6 +53,11 @@ def run(args: argparse.Namespace) -> int:
     record, faults = repair_stamps(record)
     record = cut(replace(record, faults=(*record.faults, *faults)), args)
     rig = load_rig(args.model)
+    if args.condition is not None:
+        if rig.condition(args.condition) is None:
+            known = ", ".join(c.record for c in rig.conditions) or "a model with conditions"
+            raise ParameterError(f"--condition {args.condition}: not in {args.model}, expected {known}")
+        rig = rig.under(args.condition)
     from rsea_ros.checks.check import check_record  # after the bag, so that a bad bag is refused at once
 
     comparisons = predict(rig, record)

@@ -23,7 +23,7 @@ from rsea_ros.diagnosis.criteria import (
     preference,
 )
 from rsea_ros.diagnosis.evaluation import Selection, Trial, trial_of
-from rsea_ros.diagnosis.initial_guess import RecordView, initial_guesses
+from rsea_ros.diagnosis.initial_guess import initial_guesses, view_for
 from rsea_ros.diagnosis.result import Reason
 from rsea_ros.diagnosis.score import likelier_by
 from rsea_ros.diagnosis.settings import DiagnosisSettings
@@ -120,7 +120,7 @@ class ReducedModels:
         guesses = [fitted_parameters(t, rival) for t in trials if is_trial_of(t, rival.name, rest)][-1:]
         if not guesses:
             rig, _ = apply(rest.problem.rig, rest.problem.unknowns, solution.theta)
-            guesses = initial_guesses(rival, RecordView(model.cases[0], rig, rest.outputs[0]))
+            guesses = initial_guesses(rival, view_for(rival, model.cases, rig, rest.outputs))
         guesses += [{**rival.typical, **same}] if old.unit == rival.main.unit else []
         can_be_nothing = math.isfinite(old.null) and not old.logarithmic
         guesses += [in_exchange(model.solution, name, rival)] if can_be_nothing else []

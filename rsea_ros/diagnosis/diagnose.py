@@ -21,7 +21,7 @@ from rsea_ros.diagnosis.stretches import in_stretches, stretches_of
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.effects.effect import Effect
 from rsea_ros.errors import IdentificationError
-from rsea_ros.identification.confidence import torque_scale
+from rsea_ros.identification.confidence import stated_differences, torque_scale
 from rsea_ros.identification.fit import unknowns_of, with_even_clocks
 from rsea_ros.identification.identify import lost_behind
 from rsea_ros.identification.problem import Problem, case_from
@@ -74,7 +74,8 @@ def diagnose(
         result = conclude(selection, stages, examined, pools, settings)
     cut = stretches_of(used, nominal, settings)
     lost = _lost_cycles(result)
-    return replace(result, remarks=(*lost, *remarks, *cut, *torque_scale(nominal), *result.remarks))
+    known = (*torque_scale(nominal), *stated_differences(nominal))
+    return replace(result, remarks=(*lost, *remarks, *cut, *known, *result.remarks))
 
 
 def _lost_cycles(result: Diagnosis) -> tuple[Remark, ...]:
@@ -117,7 +118,8 @@ def search(
     """
     rig = nominal.rig
     effects = searched_effects(nominal, settings.without)
-    start = joint_start(record, rig) if rig.loop is not None else None
+    is_plain = rig.loop is not None and rig.condition(record.source) is None
+    start = joint_start(record, rig) if is_plain else None
     selection = select_stepwise(nominal, effects, pools, tell, settings, start)
     tell("looking for a simpler model", 0.9)
     selection = eliminate_backwards(selection, effects, pools, settings)

@@ -9,6 +9,8 @@ every value fitted and no cause.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from rsea_ros.checks.carried import check_diagnosable, require_motion
@@ -33,7 +35,9 @@ def edited(diagnosis: Diagnosis, record: Record, cause: str) -> Edit:
     check_diagnosable(record)
     require_motion(record)
     channel = next(c.channel for c in diagnosis.causes if c.name == cause)
-    extended = diagnosis.extended_rig
+    rig = diagnosis.extended_rig  # a condition may say that the run is without the cause: that is asked
+    asked = tuple(replace(c, without=c.without - {cause}) for c in rig.conditions)
+    extended = replace(rig, conditions=asked)
     without = extended.with_effects(*(e for e in extended.effects if e.name != cause))
     checked = check(record, extended)
 

@@ -138,7 +138,7 @@ class HeldOut:
             everything = replace(problem, cases=self.cases)
             return score_on(everything, self.cases, TEST, outputs or everything.outputs(theta), rule)
         rig, offsets = apply(problem.rig, problem.unknowns, theta)
-        phased = in_phase(rig, self.record.record)
+        phased = in_phase(rig.under(case.source), self.record.record)
         (outputs,) = simulate_cases((case,), phased, offsets, on_angle=problem.on_angle)
         return score(problem, (case,), outputs, rule)
 

@@ -14,7 +14,7 @@ poor minimum, where one that begins at the stated values does not.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,7 +30,7 @@ from rsea_ros.identification.unknowns import WELL_KNOWN, theta_with
 from rsea_ros.model.drive import Drive
 from rsea_ros.model.equations import train_ratio
 from rsea_ros.model.inverse import Motion, smooth
-from rsea_ros.model.rig import Rig
+from rsea_ros.model.rig import Rig, field_of
 from rsea_ros.records.record import BoolArray, FloatArray
 from rsea_ros.records.statistics import on_even_clock, power_density
 
@@ -323,9 +323,18 @@ class RecordView:
         return angle_errors(self.case, self.rig, self.outputs)
 
 
+def view_for(
+    effect: Effect, cases: Sequence[Case], rig: Rig, outputs: Sequence[dict[str, FloatArray]]
+) -> RecordView:
+    """Return the first case in which an effect acts, preferably one of the rig as it is."""
+    differs = [rig.condition(case.source) for case in cases]
+    k = min(range(len(cases)), key=lambda i: 1 + (effect.name in c.without) if (c := differs[i]) else 0)
+    return RecordView(cases[k], rig.under(cases[k].source), outputs[k])
+
+
 def stated_starts(problem: Problem, theta: FloatArray, effect: Effect) -> list[FloatArray]:
     """Return theta with the values that the rig states, once for each default guess of an effect in it."""
     stated = problem.rig.free()
-    rig = {u.name: u.start for u in problem.unknowns if u.name in stated}
+    rig = {u.name: u.start for u in problem.unknowns if field_of(u.name) in stated}
     guesses = [{f"{effect.name}.{name}": v for name, v in g.items()} for g in effect.default_guesses]
     return [theta_with(problem.unknowns, theta, {**rig, **guess}) for guess in guesses]

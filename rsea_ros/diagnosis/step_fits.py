@@ -27,7 +27,7 @@ from rsea_ros.diagnosis.candidate import (
 )
 from rsea_ros.diagnosis.criteria import is_equally_good, is_far_from_floor, preference
 from rsea_ros.diagnosis.data_split import VALIDATION, short_pieces_of
-from rsea_ros.diagnosis.initial_guess import RecordView, initial_guesses, stated_starts
+from rsea_ros.diagnosis.initial_guess import initial_guesses, stated_starts, view_for
 from rsea_ros.diagnosis.score import Score, score_on
 from rsea_ros.diagnosis.settings import DiagnosisSettings, ForwardSettings
 from rsea_ros.effects.effect import Effect
@@ -213,9 +213,9 @@ class StepFits:
         """The initial guesses of every effect that is not in the model."""
         solution = self.current.solution
         rig, _ = apply(solution.problem.rig, solution.problem.unknowns, solution.theta)
-        view = RecordView(self.current.cases[0], rig, self.current.outputs[0])
+        cases, outputs = self.current.cases, self.current.outputs
         effects = [e for e in self.effects if e.name not in solution.problem.acting]
-        guesses = self.pools.fits.map(lambda e: initial_guesses(e, view), effects)
+        guesses = self.pools.fits.map(lambda e: initial_guesses(e, view_for(e, cases, rig, outputs)), effects)
         return {e.name: g for e, g in zip(effects, guesses, strict=True)}
 
     def screen(self, solution: Solution) -> list[ScreenedEffect]:

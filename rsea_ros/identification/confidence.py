@@ -9,10 +9,11 @@ p unknowns (MacKinnon and White, J. Econometrics 29, 1985). Never less than H^-1
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import PurePath
 
 import numpy as np
 
-from rsea_ros.documents.units import in_motion
+from rsea_ros.documents.units import in_motion, with_unit
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.result import (
     CLOCKS,
@@ -27,7 +28,7 @@ from rsea_ros.identification.solver import Map, Solution, central_jacobian, seri
 from rsea_ros.identification.unknowns import Unknown, apply
 from rsea_ros.model.drive import Drive
 from rsea_ros.model.inverse import CUT_OFF
-from rsea_ros.model.rig import FIELDS, Rig
+from rsea_ros.model.rig import FIELDS, Quantity, Rig, field_of
 from rsea_ros.records.record import FloatArray, IntArray
 from rsea_ros.records.statistics import Z95
 
@@ -171,6 +172,21 @@ def torque_scale(problem: Problem) -> tuple[Remark, ...]:
     return (Remark("torque_by_motor_constant" if problem.rig.loop is None else "torque_by_loop_gains"),)
 
 
+def stated_differences(problem: Problem) -> tuple[Remark, ...]:
+    """Return a remark for each record that differs as stated, and one on conditions of other records."""
+    here = {PurePath(case.source).name for case in problem.cases}
+    others = tuple(c.record for c in problem.rig.conditions if c.record not in here)
+    remarks = []
+    for c in (c for c in problem.rig.conditions if c.record in here):
+        known = {f"{n} =": (n, q.value) for n, q in c.values.items() if not q.spread}
+        known |= {f"{n} larger by": (n, value) for n, value in c.added.items()}
+        told = [f"{how} {with_unit(f'{v:.4g}', FIELDS[n].unit)}" for how, (n, v) in known.items()]
+        told += [f"{n} fitted for it alone" for n, q in c.values.items() if q.spread]
+        told += [f"no {name}" for name in sorted(c.without)]
+        remarks += [Remark("differs", (c.record, *told))] if told else []
+    return (*remarks, *([Remark("other_records", others)] if others else []))
+
+
 def _without_the_rest(information: FloatArray, index: Sequence[int]) -> FloatArray:
     """Return the information on `index` with all other unknowns free (Schur complement)."""
     rest = [i for i in range(len(information)) if i not in index]
@@ -193,7 +209,7 @@ def _remark(unknowns: Sequence[Unknown], moved: FloatArray) -> Remark:
     names = tuple(u.name for u in unknowns)
     if len(names) == 1:
         return Remark("only_prior" if np.isfinite(unknowns[0].doubt) else "not_shown", names)
-    share_a_factor = all(name in FIELDS for name in names) and moved.min() > _ALIKE * moved.max()
+    share_a_factor = all(field_of(name) in FIELDS for name in names) and moved.min() > _ALIKE * moved.max()
     return Remark("only_ratios" if share_a_factor else "only_together", names)
 
 
@@ -236,13 +252,15 @@ def identified_rig(solution: Solution, parameters: Sequence[ParameterEstimate]) 
         )
         for n, s in rig.sensors.items()
     }
-    quantities = dict(rig.quantities)
-    for estimate in parameters:
-        if estimate.name in quantities:
-            quantities[estimate.name] = replace(
-                quantities[estimate.name], ci95=estimate.ci95, source="identified"
-            )
-    return replace(rig, quantities=quantities, sensors=sensors)
+    intervals = {p.name: p.ci95 for p in parameters}
+
+    def known(quantities: Mapping[str, Quantity], record: str = "") -> dict[str, Quantity]:
+        at = {n: n + record for n in quantities}
+        return {n: replace(q, ci95=intervals[at[n]], source="identified") if at[n] in intervals else q
+                for n, q in quantities.items()}  # fmt: skip
+
+    conditions = tuple(replace(c, values=known(c.values, f"@{c.record}")) for c in rig.conditions)
+    return replace(rig, quantities=known(rig.quantities), sensors=sensors, conditions=conditions)
 
 
 def overlays_of(case: Case, outputs: Mapping[str, FloatArray]) -> tuple[Overlay, ...]:
@@ -258,7 +276,7 @@ def is_off_rig(solution: Solution) -> bool:
     """Return whether a fit has taken some value of the rig that far, determined by the data or not."""
     stated = solution.problem.rig.free()
     unknowns = zip(solution.problem.unknowns, solution.theta, strict=True)
-    return any(u.name in stated and u.sigmas(float(t)) > FAR for u, t in unknowns)
+    return any(field_of(u.name) in stated and u.sigmas(float(t)) > FAR for u, t in unknowns)
 
 
 def off_rig(parameters: Iterable[ParameterEstimate]) -> tuple[Remark, ...]:

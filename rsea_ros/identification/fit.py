@@ -15,6 +15,7 @@ most careful form: the span). Only the diagnosis decides which law it is.
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import PurePath
 
 import numpy as np
 
@@ -148,8 +149,12 @@ def unknowns_of(rig: Rig, cases: Sequence[Case]) -> tuple[Unknown, ...]:
     channels = sorted({n for case in cases for n in case.measured})
     stated = _stated_effects(rig, cases)
     effects = [unknowns_of_effect(e, start, rig.known | idle(e, rig)) for e, start in stated]
+    own = [differs.values if (differs := rig.condition(case.source)) else {} for case in cases]
+    records = {"", *(PurePath(case.source).name for case in cases)}
+    tells = (u for u in unknowns_of_rig(rig) if not u.name.startswith(_beside(rig, channels)))
+    of_rig = [u for u in tells if not own or any(u.name not in values for values in own)]
     return (
-        *(u for u in unknowns_of_rig(rig) if not u.name.startswith(_beside(rig, channels))),
+        *(u for u in of_rig if u.name.partition("@")[2] in records),
         *(u for group in effects for u in group),
         *(clocks(channels, rig) if not is_inverse(rig) else ()),
     )

@@ -20,6 +20,7 @@ from rsea_ros.identification.confidence import (
     off_rig,
     overlays_of,
     parameters_of,
+    stated_differences,
     torque_scale,
     undetermined_remarks,
 )
@@ -128,7 +129,7 @@ def identify(
     report("fitting", 0.4)
     with worker_pools() as pools:
         start = None
-        if not is_inverse(rig):
+        if not is_inverse(rig) and rig.condition(records[0].source) is None:
             start = start_from(responses, rig) if rig.loop is None else joint_start(records[0], rig)
         solution, cases, required = fit(cases, rig, run=pools.run, start=start)
         steady, misfits = Evened(tuple(records), {}), _misfits(solution, cases)
@@ -175,6 +176,7 @@ def _result(
         for p in parameters_of(solution, confidence)
     )
     rig = identified_rig(solution, parameters)
+    first = rig.under(records[0].source)
     return Identification(
         rig=rig,
         sources=tuple(r.source for r in records),
@@ -188,12 +190,13 @@ def _result(
         noise_rms={n: float(np.mean([c.noise[n] for c in cases if n in c.noise])) for n in errors},
         fit_percent={n: fit_percent(e, y) for n, (e, y) in errors.items()},
         responses=responses,
-        models=tuple(model_response(rig, r.output, r.frequency) for r in responses),
+        models=tuple(model_response(first, r.output, r.frequency) for r in responses),
         overlays=overlays_of(problem.cases[0], outputs[0]),
         statics=statics_of(records[0], rig),
         remarks=(
             *off_rig(parameters),
             *torque_scale(problem),
+            *stated_differences(problem),
             *undetermined_remarks(problem.unknowns, confidence),
         ),
         notes=tuple(note for r in records for note in r.notes),

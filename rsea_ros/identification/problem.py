@@ -90,6 +90,7 @@ def case_from(
     masked: samples by channel that are faulty and must not count. rule: of the noise that the record shows.
     Raises IdentificationError when no channel of the record is one that the rig has.
     """
+    rig = rig.under(record.source)
     if is_inverse(rig):
         return _inverse_case(record, rig, rule)
     record = with_command(record, rig)
@@ -184,16 +185,22 @@ def simulate_cases(
 ) -> list[list[dict[str, FloatArray]]]:
     """Return for each of some clocks the channels of cases, simulated once and read as the clocks have it.
 
-    A channel whose zero is unknown comes with the measured mean.
+    Each on the rig as it was for its record. A channel whose zero is unknown comes with the measured mean.
     """
-    drives = [c.drive for c in cases if isinstance(c.drive, Drive)]
-    at = [[_instants(drive, one) for one in clocks] for drive in drives]
-    simulations = iter(simulate_drives(rig, drives, at, on_angle=on_angle))
+    conditions = [rig.condition(c.source) for c in cases]
+    names = [differs.record if differs else "" for differs in conditions]
+    rigs = {name: rig.under(name) for name in names}
+    simulations = {}
+    for name, own in rigs.items():
+        alike = [c.drive for c, n in zip(cases, names, strict=True) if n == name]
+        drives = [drive for drive in alike if isinstance(drive, Drive)]
+        at = [[_instants(drive, one) for one in clocks] for drive in drives]
+        simulations[name] = iter(simulate_drives(own, drives, at, on_angle=on_angle))
     by_case = [
-        [_on_measured_zero(c, torques_along(rig, c.drive))] * len(clocks)
+        [_on_measured_zero(c, torques_along(rigs[name], c.drive))] * len(clocks)
         if isinstance(c.drive, Motion)
-        else [_on_measured_zero(c, outputs) for outputs in next(simulations)]
-        for c in cases
+        else [_on_measured_zero(c, outputs) for outputs in next(simulations[name])]
+        for c, name in zip(cases, names, strict=True)
     ]
     return [[outputs[k] for outputs in by_case] for k in range(len(clocks))]
 

@@ -111,6 +111,8 @@ Code = Literal[
     "on_measured_angle",
     "coloured_noise",
     "off_rig",
+    "differs",
+    "other_records",
     "stretches",
     "lost_cycles",
 ]
@@ -129,6 +131,7 @@ coherence_lost: of a channel with the command, above a frequency (Hz).
 on_measured_angle: an effect was simulated on the measured rotor angle.
 coloured_noise: of channels, taken from the residual.
 off_rig: the rig states a value, the data another (that, 95 % interval), so many of its stated spreads away.
+differs: a record differs from the rig, and how. other_records: of which the rig has conditions for nothing.
 stretches: of long records so many s were used, of so many.
 lost_cycles: so many cycles of the driver were lost, and the motor torque shows them.
 """

@@ -142,7 +142,7 @@ _LAG = 0.02
 
 def scale_of(cases: Sequence[Case], rig: Rig) -> Scale:
     """Return how a machine and its records compare with the machine of the catalogue."""
-    torque = max((torque_size(case, rig) for case in cases), default=0.0)
+    torque = max((torque_size(case, rig.under(case.source)) for case in cases), default=0.0)
     stiffness = STIFFNESS * torque / TORQUE if rig.rigid_spring else rig["spring.stiffness"]
     speed = max((_speed(case) for case in cases), default=0.0)
     inertia = rig["rotor.reflected_inertia"]

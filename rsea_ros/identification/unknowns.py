@@ -11,7 +11,7 @@ import numpy as np
 
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.effects.effect import Effect, Parameter
-from rsea_ros.model.rig import FIELDS, LEAST_SIZE, EffectSetting, Rig
+from rsea_ros.model.rig import FIELDS, LEAST_SIZE, EffectSetting, Quantity, Rig, field_of
 from rsea_ros.records.record import FloatArray
 
 TURN = 2.0 * math.pi
@@ -57,7 +57,8 @@ WELL_KNOWN = 0.3
 class Unknown:
     """One number that a fit may move.
 
-    name: `rotor.reflected_inertia`, `coulomb_friction.torque`, `clock.ft`. low, high: bounds, SI.
+    name: `rotor.reflected_inertia`, `coulomb_friction.torque`, `clock.ft`, `spring.damping@cold` of a record.
+    low, high: bounds, SI.
     logarithmic: the fit works on its logarithm. doubt: one sigma of the prior around `start`, in the
     coordinate that the fit works in; inf for none. scale: a step of that coordinate that matters.
     inverse: the fit works on -1 / value, for what is infinite as a rule and has no slope there.
@@ -93,7 +94,7 @@ class Unknown:
     @cached_property
     def is_cyclic(self) -> bool:
         """Whether a whole turn more is the same value: an angle that only its sine enters by."""
-        return self.name.endswith(".gravity_angle")
+        return field_of(self.name).endswith(".gravity_angle")
 
     def sigmas(self, coordinate: float) -> float:
         """Return how many sigmas of its prior a value lies from its start.
@@ -146,21 +147,23 @@ class Unknown:
 
 
 def unknowns_of_rig(rig: Rig) -> tuple[Unknown, ...]:
-    """Return the values of the rig that a fit may move, with the rig's spread as their prior."""
-    return tuple(_rig_unknown(rig, name) for name in rig.free())
+    """Return the values of the rig that a fit may move, of single records too, with spreads as priors."""
+    shared = {n: rig.quantities[n] for n in rig.free()}
+    own = {n: q for n, q in rig.of_records().items() if q.spread > 0.0 and field_of(n) not in rig.known}
+    return tuple(_rig_unknown(name, quantity) for name, quantity in {**shared, **own}.items())
 
 
-def _rig_unknown(rig: Rig, name: str) -> Unknown:
+def _rig_unknown(name: str, quantity: Quantity) -> Unknown:
     """Return a value of the rig as an unknown: on its logarithm where its prior keeps it away from 0.
 
     A value that may well be near zero (a damping) moves on its own scale: its logarithm would never return.
     """
-    value, spread, unit = rig[name], rig.spread(name), rig.unit(name)
+    value, spread, field = quantity.value, quantity.spread, FIELDS[field_of(name)]
     if value > 0.0 and spread <= WELL_KNOWN:
-        return Unknown(name, value, unit, value * 1e-4, value * 1e4, True, spread, 1.0)
+        return Unknown(name, value, field.unit, value * 1e-4, value * 1e4, True, spread, 1.0)
     doubt = spread * value if value > 0.0 else math.inf
-    low = FIELDS[name].low if FIELDS[name].low_allowed else 1e-4 * value
-    return Unknown(name, value, unit, low, math.inf, False, doubt, value or 1.0)
+    low = field.low if field.low_allowed else 1e-4 * value
+    return Unknown(name, value, field.unit, low, math.inf, False, doubt, value or 1.0)
 
 
 def unknowns_of_effect(
@@ -213,7 +216,7 @@ def clock_rates(channels: Iterable[str]) -> tuple[Unknown, ...]:
 def apply(rig: Rig, unknowns: Sequence[Unknown], theta: FloatArray) -> tuple[Rig, Clocks]:
     """Return the rig with the values of theta, effects included, and the clocks of its sensors."""
     values = {u.name: u.outer(t) for u, t in zip(unknowns, theta.tolist(), strict=True)}
-    of_rig = {n: v for n, v in values.items() if n in FIELDS}
+    of_rig = {n: v for n, v in values.items() if field_of(n) in FIELDS}
     offset, rate = (
         {u.name.split(".")[1]: values[u.name] for u in unknowns if u.is_clock and u.is_rate == of_rate}
         for of_rate in (False, True)
@@ -240,7 +243,7 @@ def start_vector(unknowns: Sequence[Unknown]) -> FloatArray:
 
 def vector_of(unknowns: Sequence[Unknown], rig: Rig) -> FloatArray:
     """Return the coordinates of a rig's values; for values that it does not state, the fit's start."""
-    values = rig.values()
+    values = {**rig.values(), **{name: quantity.value for name, quantity in rig.of_records().items()}}
     return np.array([u.inner(values.get(u.name, u.start)) for u in unknowns])
 
 

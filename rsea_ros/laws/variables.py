@@ -254,6 +254,7 @@ def case_model(
     outputs: simulated channels. place: of the missing torque.
     """
     rig, clocks = apply(problem.rig, problem.unknowns, theta)
+    rig = rig.under(case.source)
     residual = {n: np.where(case.mask[n], case.measured[n] - outputs[n], 0.0) for n in case.measured}
     if isinstance(case.drive, Motion):
         t = case.drive.t - case.drive.t[0]

@@ -104,13 +104,14 @@ def predict(record: Record | Rig | str, rig: Rig | str | Record) -> Mapping[str,
     rig: a Rig, a file, or the name of a rig in config/rigs; the other order means the same. Returns a
     Comparison for each channel by name.
     For a rig without a spring, or a measured motion, it compares the torques along it (see inverse.py); for
-    a sensor with an unknown zero it compares changes. Behind a gap of the whole record it begins anew.
+    a sensor with an unknown zero it compares changes. Behind a gap of the whole record it begins anew. Where
+    the rig has a condition of the record's name, that holds.
     Raises IdentificationError for a record with nothing to compare. Nothing is fitted.
     """
     record, rig = (rig, record) if isinstance(rig, Record) else (record, rig)
     if not isinstance(record, Record) or isinstance(rig, Record):
         raise ParameterError("predict: expected a Record and a rig")
-    rig = load_rig(rig)
+    rig = load_rig(rig).under(record.source)
     record = bound_values(with_command(record, rig))
     check_command(record)
     check_pace(record)

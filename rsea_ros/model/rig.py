@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from pathlib import PurePath
 from types import MappingProxyType
 from typing import Literal
 
@@ -175,6 +176,30 @@ class EffectSetting:
 
 
 @dataclass(frozen=True)
+class Condition:
+    """What differs in one record of a machine, known by the last part of its path.
+
+    values: replace the rig's; a fit moves those with a spread, for this record alone. added: to the rig's
+    value or what a fit makes of it, SI: a payload. without: names of effects that do not act in it.
+    """
+
+    record: str
+    values: Mapping[str, Quantity] = field(default_factory=dict)
+    added: Mapping[str, float] = field(default_factory=dict)
+    without: frozenset[str] = frozenset()
+
+    def moved(self, values: Mapping[str, float]) -> Condition:
+        """Return the condition with some of its values replaced (SI, by names as `spring.damping@cold`)."""
+        moved = {n: values.get(f"{n}@{self.record}", q.value) for n, q in self.values.items()}
+        return replace(self, values={n: replace(q, value=moved[n]) for n, q in self.values.items()})
+
+
+def field_of(name: str) -> str:
+    """Return the field of a value, `spring.damping` of `spring.damping@cold` too: of that record alone."""
+    return name.partition("@")[0]
+
+
+@dataclass(frozen=True)
 class PositionLoop:
     """Position loop that was active during the record: command = k_v (k_p (reference - q) - dq/dt).
 
@@ -200,7 +225,8 @@ class Rig:
     (model/inverse.py). loop: kind of the position loop whose targets command the bench, a key of
     LOOP_FIELDS; its gains are among the quantities. controller: a loop that added its torque to the command
     of the record. hold: the command between two samples: the first of them, a line between them, or the
-    band-limited curve of an analogue command sampled behind a filter.
+    band-limited curve of an analogue command sampled behind a filter. conditions: what differs in some
+    records.
     """
 
     name: str
@@ -221,6 +247,7 @@ class Rig:
     controller: PositionLoop | None = None
     hold: Hold = "zero"
     effects: tuple[EffectSetting, ...] = ()
+    conditions: tuple[Condition, ...] = ()
     about: str = ""
     source: str = ""
 
@@ -256,12 +283,36 @@ class Rig:
         return self.moved(values, self.effects)
 
     def moved(self, values: Mapping[str, float], effects: tuple[EffectSetting, ...]) -> Rig:
-        """Return the rig with some values replaced and exactly these effects: at once, for fits."""
+        """Return the rig with some values replaced and exactly these effects: at once, for fits.
+
+        A name such as `spring.damping@cold` is that of a condition.
+        """
         quantities = dict(self.quantities)
         for name, value in values.items():
-            q = quantities.get(name, _UNSTATED)
-            quantities[name] = Quantity(float(value), q.spread, q.source, q.ci95)
-        return replace(self, quantities=quantities, effects=effects)
+            if "@" not in name:
+                q = quantities.get(name, _UNSTATED)
+                quantities[name] = Quantity(float(value), q.spread, q.source, q.ci95)
+        conditions = tuple(c.moved(values) for c in self.conditions)
+        return replace(self, quantities=quantities, effects=effects, conditions=conditions)
+
+    def of_records(self) -> dict[str, Quantity]:
+        """Return the values of single records, by names such as `spring.damping@cold`."""
+        return {f"{n}@{c.record}": q for c in self.conditions for n, q in c.values.items()}
+
+    def condition(self, record: str) -> Condition | None:
+        """Return what differs in a record, given by its path or the last part of it; None for nothing."""
+        return next((c for c in self.conditions if c.record == PurePath(record).name), None)
+
+    def under(self, record: str) -> Rig:
+        """Return the rig as it was for a record (see `condition`), without conditions."""
+        differs = self.condition(record)
+        if differs is None:
+            return replace(self, conditions=()) if self.conditions else self
+        quantities = {**self.quantities, **differs.values}
+        for name, more in differs.added.items():
+            quantities[name] = replace(quantities.get(name, _UNSTATED), value=self[name] + more)
+        effects = tuple(e for e in self.effects if e.name not in differs.without)
+        return replace(self, quantities=quantities, effects=effects, conditions=())
 
     def with_effects(self, *effects: EffectSetting) -> Rig:
         """Return the rig with exactly these active effects."""
@@ -279,7 +330,7 @@ class Rig:
         return self.with_effects(*self.effects, setting)
 
     def free(self) -> tuple[str, ...]:
-        """Return the names that a fit may change: those with a spread, except the known ones."""
+        """Return the names that a fit may change in every record: those with a spread, but the known ones."""
         return tuple(n for n, q in self.quantities.items() if q.spread > 0.0 and n not in self.known)
 
     def spread(self, name: str) -> float:
@@ -337,11 +388,10 @@ def check_structure(rig: Rig) -> None:
     for end in set(rig.clamped) - set(END_NAMES):
         raise RigError(f"rig {rig.name}: clamped end {end!r}, expected one of {', '.join(END_NAMES)}")
     _check_trains(rig)
-    _check_sensor_end(rig)
+    _check_ends(rig)
     _check_spring(rig)
     for name in ("rotor.reflected_inertia", "rotor.reflected_damping"):
         rig[name]
-    _check_encoder_end(rig)
     _check_loop(rig)
     _check_motion(rig)
     for end in END_NAMES:
@@ -362,17 +412,14 @@ def _check_trains(rig: Rig) -> None:
     for train in rig.other_trains:
         if train not in TRAINS:
             raise RigError(f"rig {rig.name}: gear.or has {train!r}, {expected}", "gear.or")
-    if rig.beside_spring not in PARTS:
-        raise RigError(
-            f"rig {rig.name}: beside_spring = {rig.beside_spring!r}, expected {' or '.join(PARTS)}",
-            "beside_spring",
-        )
 
 
-def _check_sensor_end(rig: Rig) -> None:
-    for key, end in (("proximal", rig.proximal), ("ft_end", rig.ft_end)):
-        if end not in END_NAMES:
-            raise RigError(f"rig {rig.name}: {key} = {end!r}, expected one of {', '.join(END_NAMES)}", key)
+def _check_ends(rig: Rig) -> None:
+    possible = {"proximal": END_NAMES, "ft_end": END_NAMES, "encoder_end": ("gear_output", "spring_end"),
+                "motion": ("simulated", "measured"), "beside_spring": PARTS}  # fmt: skip
+    for key, ends in possible.items():
+        if (end := getattr(rig, key)) not in ends:
+            raise RigError(f"rig {rig.name}: {key} = {end!r}, expected one of {', '.join(ends)}", key)
     if rig.ft_end == "housing_end" and math.isinf(rig["proximal_spring.stiffness"]):
         raise RigError(
             f"rig {rig.name}: ft_end = housing_end without proximal_spring.stiffness, expected that of the "
@@ -393,19 +440,8 @@ def _check_spring(rig: Rig) -> None:
         )
 
 
-def _check_encoder_end(rig: Rig) -> None:
-    if rig.encoder_end not in ("gear_output", "spring_end"):
-        raise RigError(
-            f"rig {rig.name}: encoder_end = {rig.encoder_end!r}, expected gear_output or spring_end",
-            "encoder_end",
-        )
-
-
 def _check_motion(rig: Rig) -> None:
     """Raise RigError for a measured motion of what the torques along it cannot be told of."""
-    expected = "expected simulated or measured"
-    if rig.motion not in ("simulated", "measured"):
-        raise RigError(f"rig {rig.name}: motion = {rig.motion!r}, {expected}", "motion")
     reasons = {
         "a rigid spring, which is judged so by itself": rig.rigid_spring,
         "a position loop": rig.loop is not None,

@@ -6,6 +6,8 @@ A value is written `{value: 0.953, unit: kg m^2, spread: 0.3, source: Table 2}`;
 
 import math
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
+from pathlib import PurePath
 from typing import Any, TypeVar
 
 from rsea_ros.documents.strict_yaml import (
@@ -24,7 +26,7 @@ from rsea_ros.documents.strict_yaml import (
     unit,
 )
 from rsea_ros.documents.units import plain
-from rsea_ros.documents.wording import quote
+from rsea_ros.documents.wording import did_you_mean, quote
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.errors import FieldError, RigError, RseaError
 from rsea_ros.model.rig import (
@@ -33,6 +35,7 @@ from rsea_ros.model.rig import (
     FIELDS,
     HOLDS,
     LOOP_FIELDS,
+    Condition,
     EffectSetting,
     Field,
     PositionLoop,
@@ -102,6 +105,7 @@ TOP = (
         "between commands: the last one, a line, a band-limited curve",
     ),
     Key("effects", "list", "none", "active effects of the catalogue"),
+    Key("conditions", "list", "none", "what differs in single records"),
     *(Key(group, "mapping", NEEDED if group == "rotor" else "defaults", "see below") for group in GROUPS),
 )
 QUANTITY = (
@@ -152,6 +156,14 @@ EFFECT = (
     Key("guess", "true or false", "false", "identify starts with it; diagnose has to find it"),
     Key("ci95", "mapping", "none", "95 % intervals, written by a diagnosis"),
 )
+_DIFFERENCES = "mapping of GROUP.FIELD to {value: …, unit: …}"
+CONDITION = (
+    Key("record", "last part of the record's path, each once", NEEDED),
+    Key("values", _DIFFERENCES, "none", "replace the rig's; with a `spread` fitted for this record alone"),
+    Key("added", _DIFFERENCES, "none", "on top of the rig's, or of what a fit makes of it: a payload"),
+    Key("separate", "list of values with a spread", "none", "fitted for this record alone, from the rig's"),
+    Key("without", "list of effects", "none", "act in the other records only, be they stated or found"),
+)
 
 
 def tables() -> str:
@@ -165,7 +177,8 @@ def tables() -> str:
     parts.append(f"Channels and their units: {channels}.\n")
     parts += [table("sensors.CHANNEL.clock", CLOCK)]
     parts += [_loop_table(kind) for kind in LOOP_FIELDS]
-    parts += [table("controller", CONTROLLER), table("effects[i]", EFFECT), table("GROUP.FIELD", QUANTITY)]
+    parts += [table("controller", CONTROLLER), table("effects[i]", EFFECT)]
+    parts += [table("conditions[i]", CONDITION), table("GROUP.FIELD", QUANTITY)]
     return "\n".join(parts)
 
 
@@ -290,7 +303,7 @@ def _rig(document: Mapping[str, Any], default_name: str) -> Rig:
     quantities |= gains
     clamped = frozenset(end for end in END_NAMES if switch(groups[end], f"{end}.clamped"))
     effects = _effects(document.get("effects", []))
-    return Rig(
+    rig = Rig(
         name=text(document.get("name", default_name), "name"),
         about=text(document.get("about", ""), "about"),
         source=text(document.get("source", ""), "source"),
@@ -315,6 +328,56 @@ def _rig(document: Mapping[str, Any], default_name: str) -> Rig:
         hold=_one_of(HOLDS, document, "hold"),
         effects=effects,
     )
+    return with_conditions(rig, document["conditions"]) if "conditions" in document else rig
+
+
+def with_conditions(rig: Rig, items: Any, records: Collection[str] = ()) -> Rig:
+    """Return the rig with what a document says of single records. records: that there are; none: any.
+
+    Raises RigError naming the field.
+    """
+    conditions: list[Condition] = []
+    for i, item in enumerate(sequence(items, "conditions", "{record: …, …}") or [None]):
+        try:
+            conditions.append(_condition(item, rig, records))
+            if conditions[-1].record in (c.record for c in conditions[:-1]):
+                raise RigError(f"record {conditions[-1].record} is given twice, expected once")
+            replace(rig, conditions=tuple(conditions)).under(conditions[-1].record)  # is it a rig?
+        except RseaError as error:
+            raise RigError(f"conditions[{i}]: {error}", f"conditions[{i}]") from None
+    return replace(rig, conditions=tuple(conditions))
+
+
+def _condition(item: Any, rig: Rig, records: Collection[str]) -> Condition:
+    body = mapping(item, "condition", "a mapping with the key record")
+    only_keys(body, names(CONDITION), "condition")
+    record = text(body.get("record"), "record")
+    if not record or record not in (records or [PurePath(record).name]):
+        one = f"one of {', '.join(records)}" if records else "the last part of a record's path"
+        raise RigError(f"record = {quote(record)}, expected {one}{did_you_mean(record, records)}")
+    if list(records).count(record) > 1:
+        raise RigError(f"record = {quote(record)}: the name of several records, expected names that differ")
+    values, added = (_differences(body.get(key, {}), key) for key in ("values", "added"))
+    separate, without = (sequence(body.get(key, []), key, "names") for key in ("separate", "without"))
+    for name in (name for name in separate if name not in rig.free()):
+        free = ", ".join(rig.free()) or "it has none"
+        raise RigError(f"separate: {quote(name)}, expected a value that the rig states with a spread: {free}")
+    stated = [*values, *added, *separate, *(n for n, q in added.items() if q.spread)]
+    for name in stated:
+        if stated.count(name) > 1:
+            raise RigError(f"{name}: expected once, in values, in added (without a spread) or in separate")
+    of_rig = {name: rig.quantities[name] for name in separate}
+    more = {name: quantity.value for name, quantity in added.items()}
+    effects = frozenset(effect_named(text(name, "without")).name for name in without)
+    return Condition(record, {**values, **of_rig}, more, effects)
+
+
+def _differences(item: Any, key: str) -> dict[str, Quantity]:
+    body = mapping(item, key, "a mapping of GROUP.FIELD to {value: …, unit: …}")
+    for name in (name for name in body if name not in FIELDS):
+        near = did_you_mean(str(name), FIELDS)
+        raise RigError(f"{key}: {quote(name)}, expected a value such as spring_end.inertia{near}")
+    return {name: _quantity(name, quantity) for name, quantity in body.items()}
 
 
 def _quantities(group: str, body: Mapping[str, Any]) -> list[tuple[str, Quantity]]:

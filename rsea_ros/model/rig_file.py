@@ -5,7 +5,7 @@
 
 import os
 import sysconfig
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,8 +13,8 @@ from typing import Any
 from rsea_ros.documents import strict_yaml
 from rsea_ros.documents.wording import did_you_mean, quote
 from rsea_ros.errors import OutputError, RigError
-from rsea_ros.model.rig import CLOCK_DOUBT, FIELDS, Quantity, Rig, Sensor
-from rsea_ros.model.rig_document import rig_from_document
+from rsea_ros.model.rig import CLOCK_DOUBT, FIELDS, Condition, Quantity, Rig, Sensor
+from rsea_ros.model.rig_document import rig_from_document, with_conditions
 from rsea_ros.records.record import UNITS
 
 
@@ -26,16 +26,11 @@ def rig_to_document(rig: Rig) -> dict[str, Any]:
         "source": rig.source,
         "proximal": rig.proximal,
     }
-    if rig.linear:
-        document["linear"] = True
-    if rig.ft_end != "spring_end":
-        document["ft_end"] = rig.ft_end
-    if rig.encoder_end != "gear_output":
-        document["encoder_end"] = rig.encoder_end
-    if rig.beside_spring != "chassis":
-        document["beside_spring"] = rig.beside_spring
-    if rig.motion != "simulated":
-        document["motion"] = rig.motion
+    usual = {
+        "linear": False, "ft_end": "spring_end", "encoder_end": "gear_output", "beside_spring": "chassis",
+        "motion": "simulated",
+    }  # fmt: skip
+    document |= {key: getattr(rig, key) for key, value in usual.items() if getattr(rig, key) != value}
     if rig.loop:
         document["controller"] = {"kind": rig.loop}
     if rig.hold != "zero":
@@ -66,7 +61,16 @@ def rig_to_document(rig: Rig) -> dict[str, Any]:
         }
         for e in rig.effects
     ]
+    if rig.conditions:
+        document["conditions"] = [_condition_to_document(c) for c in rig.conditions]
     return document
+
+
+def _condition_to_document(c: Condition) -> dict[str, Any]:
+    values = {n: _quantity_to_document(n, q) for n, q in c.values.items()}
+    added = {n: _quantity_to_document(n, Quantity(v)) for n, v in c.added.items()}
+    body = {"values": values, "added": added, "without": sorted(c.without)}
+    return {"record": c.record, **{key: item for key, item in body.items() if item}}
 
 
 def _sensor_to_document(name: str, sensor: Sensor) -> dict[str, Any]:
@@ -145,6 +149,20 @@ def load_rig(name_or_path: str | Path | Rig) -> Rig:
     return strict_yaml.load(path, "a rig in YAML that can be read", RigError, build)
 
 
+def load_conditions(path: str | Path, rig: Rig, records: Collection[str]) -> Rig:
+    """Return a rig with the conditions of a file in place of its own. records: names that there are.
+
+    Raises RigError with file, line, field, value and expected value. Format: docs/rig.md.
+    """
+
+    def build(content: Any) -> Rig:
+        body = strict_yaml.mapping(content, "file", "a mapping with the key conditions")
+        strict_yaml.only_keys(body, {"conditions"}, "file")
+        return with_conditions(rig, body.get("conditions"), records)
+
+    return strict_yaml.load(Path(path), "a list of conditions in YAML that can be read", RigError, build)
+
+
 def save_rig(rig: Rig, path: str | Path, *, force: bool = False) -> None:
     """Write a rig as YAML that `load_rig` reads back to the same rig; `force`: over a file that has the name.
 
@@ -170,10 +188,11 @@ class RigChoice:
     """option: the rig as it was named, empty if a Rig was passed. is_default: the user named none.
 
     topics, part: options of the call, such as --joint elbow, that say which topics and which part of the
-    record were read; a command on the same bags needs them too.
+    record were read; a command on the same bags needs them too. conditions: file of --conditions, or empty.
     """
 
     option: str = ""
     is_default: bool = False
     topics: tuple[str, ...] = ()
     part: tuple[str, ...] = ()
+    conditions: str = ""

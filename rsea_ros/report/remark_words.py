@@ -97,6 +97,8 @@ _WORDS: Mapping[Code, str] = {
     "which is steady, falls with frequency, and agrees with neither command nor motion nor another sensor.",
     "off_rig": "{name} differs from the rig: the rig states {stated} {unit}, the fit gives {fitted} {unit} "
     "(95 %), {spreads} of the stated spreads away.",
+    "differs": "{name} differs as stated: {others}.",
+    "other_records": "Nothing was fitted to {names}, of which the rig has conditions too.",
     "stretches": "Models were fitted and tested on {v[0]:.0f} s of the {v[1]:.0f} s recorded: on stretches "
     "spread evenly, and on those that the nominal model simulates worst. The data were checked in full.",
     "lost_cycles": "{v[0]:.0f} lost cycles of the driver are a likely cause of the misfit: behind them the "
@@ -120,6 +122,7 @@ def _sentence(r: Remark) -> str:
     fields: dict[str, object] = {
         "name": name, "names": list_names(r.names), "v": v, "unit": words.unit(r.unit),
         "channels": list_names([words.channel(n) for n in r.names]),
+        "others": list_names(r.names[1:]),
         "effects": list_names([words.effect(n) for n in r.names]),
         "remedy": _REMEDY.get(name, _MEASURE),
         "fixes": _FIXES_LOOP if any(n.startswith("controller.") for n in r.names) else _FIXES,
@@ -170,9 +173,10 @@ def right_rig(fitted: str = "") -> str:
 def command(verb: str, sources: Sequence[str], name: str, choice: RigChoice, rig: str = "") -> str:
     """Return the command that calls a verb on the same part of the same data.
 
-    name: of the rig, used if it was passed as a Rig. rig: another rig than that of the choice.
+    name: of the rig, used if it was passed as a Rig. rig: another than that of the choice, conditions in it.
     """
-    options = ["--rig", rig or choice.option or name, *choice.topics, *choice.part]
+    differs = ["--conditions", choice.conditions] if choice.conditions and not rig else []
+    options = ["--rig", rig or choice.option or name, *differs, *choice.topics, *choice.part]
     return shlex.join(["rsea", verb, *sources, *options])
 
 

@@ -29,7 +29,7 @@ class World:
         self.models = ReducedModels([effect_named(n) for n in effects], POOLS, DEFAULT)
         monkeypatch.setattr(elimination, "fit_candidate", fits.fit)
         monkeypatch.setattr(elimination, "apply", lambda rig, unknowns, theta: (rig, None))
-        monkeypatch.setattr(elimination, "RecordView", lambda case, rig, outputs: (case, rig, outputs))
+        monkeypatch.setattr(elimination, "view_for", lambda effect, cases, rig, outputs: None)
         monkeypatch.setattr(elimination, "initial_guesses", lambda effect, view: [{"from": "residual"}])
         monkeypatch.setattr(elimination, "in_exchange", lambda solution, name, rival: {"instead of": name})
         monkeypatch.setattr(elimination, "screen", self.screen)

@@ -29,6 +29,9 @@ SAID = {
     Remark("coloured_noise", ("ft", "position")): "The noise of the F/T torque and position is coloured:",
     Remark("off_rig", ("spring.stiffness",), (1530.456, 1989.61, 1989.53, 1989.69, 5.247), "N m/rad"): "the "
     "rig states 1530 N·m/rad, the fit gives 1989.610 ± 0.080 N·m/rad (95 %), 5.2 of the stated spreads away",
+    Remark("differs", ("cold", "spring.damping = 3 N m s/rad", "no backlash")): "cold differs as stated: "
+    "spring.damping = 3 N m s/rad and no backlash.",
+    Remark("other_records", ("warm", "hot")): "Nothing was fitted to warm and hot, of which the rig has",
     Remark("lost_cycles", values=(108.0,)): "108 lost cycles of the driver are a likely cause",
     Remark("stretches", values=(160.1, 600.0), unit="s"): "on 160 s of the 600 s recorded:",
 }

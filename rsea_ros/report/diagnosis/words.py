@@ -298,7 +298,10 @@ def terminal_lines(diagnosis: Diagnosis, width: int = WIDTH) -> list[Text]:
     if off:  # what speaks against the rig
         again = remarks.command("identify", d.sources, d.rig_name, d.rig_choice)
         rows.append(command_row("", remarks.right_rig(), again, width))
-    rows += [row(name, text, width) for name, text in _rows(d, remarks.remark_sentences(others))]
+    stated = [r for r in others if r.code == "differs"]
+    rows += [row("record", sentence, width) for sentence in remarks.remark_sentences(stated)]
+    unclear = remarks.remark_sentences(r for r in others if r not in stated)
+    rows += [row(name, text, width) for name, text in _rows(d, unclear)]
     shown = (Text.assemble((text[:LABEL], "dim"), text[LABEL:]) for text in rows)
     return [Text(wrap(headline(d), width), style=style), *shown]
 
