@@ -11,7 +11,7 @@ from rsea_ros.hardware.device import State
 from rsea_ros.hardware.protection import PROCESS, Protection
 from rsea_ros.model.drive import steps_per_sample
 from rsea_ros.model.rig import Rig
-from rsea_ros.model.simulation import build, measure, run
+from rsea_ros.model.simulation import Filters, build, measure, run
 from rsea_ros.model.step import OUTPUTS
 from rsea_ros.records.record import FloatArray
 
@@ -41,9 +41,10 @@ class SimulatedDevice:
     ) -> None:
         self._rig, self._noise, self._clock = rig, noise, clock or _steady_clock()
         self._rng = np.random.default_rng(seed)
-        self._per_second = rate * steps_per_sample(1.0 / rate)
+        self._rate, self._per_second = rate, rate * steps_per_sample(1.0 / rate)
         self._duration = duration
         self._machine = build(rig, 1.0 / self._per_second, duration)
+        self._filters = self._new_filters()
         self._values = np.zeros(len(OUTPUTS))
         self._start: int | None = None
         self._steps, self._torque = 0, 0.0
@@ -54,14 +55,20 @@ class SimulatedDevice:
         """Start at rest, now, also after a `close`."""
         if self._steps:
             self._machine = build(self._rig, 1.0 / self._per_second, self._duration)
+            self._filters = self._new_filters()
             self._values = np.zeros(len(OUTPUTS))
         self._steps, self._torque, self._writes = 0, 0.0, []
         self._start = self._clock()
 
+    def _new_filters(self) -> Filters:
+        return Filters(self._rig, 1.0 / self._per_second, 1.0 / self._rate, held=not self._machine.lags)
+
     def read(self) -> State:
         """Advance to now and measure."""
         self._advance()
-        values = {name: self._measure(name, self._values[i]) for i, name in enumerate(OUTPUTS)}
+        true = self._values.copy()
+        self._filters.pass_sample(true)
+        values = {name: self._measure(name, true[i]) for i, name in enumerate(OUTPUTS)}
         stamp = self._instant(self._steps)
         wrench = None if self._rig.rigid_spring else (0.0, 0.0, 0.0, 0.0, 0.0, values["ft"])
         deflection = values["deflection"] if "deflection" in self._rig.sensors else math.nan
@@ -117,6 +124,7 @@ class SimulatedDevice:
         held = self._held_torque(begin, count)
         out = np.empty((count, len(OUTPUTS)))
         run(self._machine, held, out, start=first / self._per_second)
+        self._filters.pass_steps(out)
         self._steps, self._values = first + count, out[-1]
 
     def _held_torque(self, begin: int, count: int) -> FloatArray:
@@ -136,7 +144,7 @@ class SimulatedDevice:
         return held
 
     def _measure(self, channel: str, value: FloatArray) -> float:
-        return float(measure(self._rig, channel, value, self._rng) if self._noise else value)
+        return float(measure(self._rig, channel, value, self._rng, self._filters) if self._noise else value)
 
 
 def _steady_clock() -> Callable[[], int]:

@@ -96,7 +96,13 @@ class Injector:
         out = (self._run(torque * (size / largest), place) - self.base) * (largest / size)
         at = {n: (t - drive.start) / drive.step for n, t in self.sampled.items()}
         smooth = np.zeros(len(drive.command))
-        return {n: sample(n, out[:, OUTPUTS.index(n)], at[n], smooth) for n in at}
+        read = {n: sample(n, out[:, OUTPUTS.index(n)], at[n], smooth) for n in at}
+        return {n: self.behind(n, y, float(np.median(np.diff(self.sampled[n])))) for n, y in read.items()}
+
+    def behind(self, channel: str, y: FloatArray, period: float) -> FloatArray:
+        """Return a channel's response, period (s) apart, behind the known filter of its sensor."""
+        known = self.rig.filters().get(channel)
+        return y if known is None else known.over(y, period)
 
     def raw(self, torque: FloatArray, place: Place) -> FloatArray:
         """Return the response of all OUTPUTS to a torque (N m) at the ends of the steps, the start first."""
@@ -192,7 +198,7 @@ def _pulse_answers(injector: Injector, period: float, count: int, place: Place) 
     pulse[:hold] = 1.0
     out = quiet.raw(pulse, place)
     at = np.minimum(np.rint(period * np.arange(count) / drive.step).astype(np.int64), steps)
-    return {n: out[at, k] for k, n in enumerate(OUTPUTS)}
+    return {n: injector.behind(n, out[at, k], period) for k, n in enumerate(OUTPUTS)}
 
 
 def _at_sensor(place: Place, period: float, count: int) -> dict[str, FloatArray]:

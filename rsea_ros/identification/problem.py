@@ -34,6 +34,7 @@ class Case:
     least: by channel its least noise. coloured: channels whose entire residual was
     taken for noise of the sensor after a fit (noise_level.py). start_shows: what the state at the start does
     to the residual, orthonormal, shape (m, k), where that state is not known; the residual is without it.
+    whole: channels of which a known filter has seen every sample.
     """
 
     drive: Drive | Motion
@@ -46,6 +47,7 @@ class Case:
     least: Mapping[str, float] = field(default_factory=dict)
     coloured: frozenset[str] = frozenset()
     start_shows: FloatArray | None = None
+    whole: frozenset[str] = frozenset()
 
     def within(self, mask: Mapping[str, BoolArray]) -> Case:
         """Return the case with only samples that are also in `mask`."""
@@ -113,6 +115,7 @@ def case_from(
         mask=MappingProxyType(counts),
         source=record.source,
         floating=floating,
+        whole=frozenset(n for n, known in rig.filters().items() if known.is_sampled),
         least=MappingProxyType({n: least_noise(heard[n].y, sensors[n], rule) for n in channels}),
     )
 

@@ -172,6 +172,9 @@ def smooth(values: FloatArray, period: float) -> FloatArray:
 
 def inverse_torque(rig: Rig, motion: Motion) -> FloatArray:
     """Return the motor torque that a motion takes, N m, filtered like the motion, shape of motion.t."""
+    if filtered := [n for n in rig.filters() if n in ("position", "motor_torque")]:
+        what = f"expected none: without a spring nothing takes it from the measured {' and '.join(filtered)}"
+        raise IdentificationError(f"rig {rig.name}: sensors.{filtered[0]}.filter, {what}")
     rig_as_is = with_structure(rig)
     m = mechanics(rig_as_is, linear_gravity=False)
     if m.order != 1 or "housing_end" not in rig.clamped:

@@ -12,11 +12,14 @@ from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Literal
 
+import numpy as np
+
 from rsea_ros.documents.units import plain, with_unit
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.errors import RigError
+from rsea_ros.model.sensor_filter import SensorFilter
 from rsea_ros.model.train import TRAINS, Train
-from rsea_ros.records.record import FloatArray
+from rsea_ros.records.record import ComplexArray, FloatArray
 
 LEAST_SIZE, GREATEST_SIZE = 1e-12, 1e12
 """Limits of the size of a nonzero value; beyond them the equations have no accurate digit."""
@@ -134,7 +137,8 @@ class Sensor:
     zero_unknown: the zero differs from record to record (an encoder that counts from power-on), so only
     changes of its values count. clock: s, delay of the reading after its stamp at the start of a record;
     clock_rate: ppm, growth of that delay with time. clock_doubt: s, one sigma of `clock`, which a fit
-    estimates. delay: s, known, by which the reading is older than that: a filter's or a bus's.
+    estimates. delay: s, known, by which the reading is older than that, as by a bus. filter: known; what it
+    logs has passed it, noise too, and then has steps of its quantum.
     """
 
     noise: float = 0.0
@@ -144,11 +148,17 @@ class Sensor:
     clock_doubt: float = CLOCK_DOUBT
     clock_rate: float = 0.0
     delay: float = 0.0
+    filter: SensorFilter | None = None
 
     @property
     def level(self) -> float:
         """The RMS of noise and rounding together: the error of a rounded value is even over a quantum."""
         return math.hypot(self.noise, self.quantum / math.sqrt(12.0))
+
+    def response(self, hz: FloatArray, period: float) -> ComplexArray:
+        """Return its delay and filter at frequencies, Hz, shape (n,). period: of its samples, s."""
+        late: ComplexArray = np.exp(-2j * np.pi * self.delay * hz)
+        return late if self.filter is None else late * self.filter.response(hz, period)
 
 
 @dataclass(frozen=True)
@@ -294,6 +304,10 @@ class Rig:
         """Return whether a channel is read when its stamps say."""
         sensor = self.sensors.get(channel)
         return sensor is None or sensor.clock == sensor.clock_rate == sensor.delay == 0.0
+
+    def filters(self) -> dict[str, SensorFilter]:
+        """Return the known filters of its sensors by channel."""
+        return {name: sensor.filter for name, sensor in self.sensors.items() if sensor.filter is not None}
 
     def clock_doubt(self, channel: str) -> float:
         """Return one sigma of the error of a channel's clock beside `clock`, s."""

@@ -23,7 +23,7 @@ from rsea_ros.documents.strict_yaml import (
     text,
     unit,
 )
-from rsea_ros.documents.units import plain
+from rsea_ros.documents.units import plain, with_unit
 from rsea_ros.documents.wording import quote
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.errors import FieldError, RigError, RseaError
@@ -43,6 +43,7 @@ from rsea_ros.model.rig import (
     Sensor,
     check_value,
 )
+from rsea_ros.model.sensor_filter import KINDS, FilterNumber, SensorFilter
 from rsea_ros.model.train import TRAINS
 from rsea_ros.records.record import MEASURED, UNITS
 
@@ -72,6 +73,13 @@ _MEANINGS = {
     },
     "spring_end.above_sensor": "share of its inertia between the spring and the F/T sensor",
 }  # fmt: skip
+
+
+def _form(n: FilterNumber) -> str:
+    """Return how a number of a filter is written."""
+    return "number" if n.unit == "1" else f"{{value: …, unit: {n.unit}}}"
+
+
 _TRAINS = ", ".join(f"`{train}`" for train in TRAINS)
 GROUPS = sorted({name.split(".")[0] for name in FIELDS} - {"controller"})
 SWITCHES: Mapping[str, Sequence[Key]] = {
@@ -91,7 +99,7 @@ TOP = (
     Key("ft_end", "`housing_end` or `spring_end`", "`spring_end`", "the end that carries the F/T sensor"),
     Key("linear", "true or false", "false", "m, N, kg replace rad, N·m, kg·m²"),
     Key("known", "list of names such as `gear.ratio`", "none", "values that no fit may change"),
-    Key("sensors", "mapping, a key for each channel", "perfect sensors", "noise, steps, clocks"),
+    Key("sensors", "mapping, a key for each channel", "perfect sensors", "noise, steps, clocks, filters"),
     Key("controller", "mapping", "none", "position loop that was active during the record, see below"),
     Key(
         "hold",
@@ -118,7 +126,15 @@ SENSOR = (
     Key("clock", "{value: …, unit: s}, below 0.01 s", "0 s", "delay of the reading after its stamp"),
     Key("clock_rate", "{value: …, unit: ppm}, below 1000 ppm", "0 ppm", "growth of that delay with time"),
     Key("delay", "{value: …, unit: s}, from 0, below 0.2 s", "0 s", "age of the reading at its stamp, known"),
+    Key("filter", "mapping, see below", "none", "filter that the reading has passed, known"),
 )
+FILTER = (
+    Key("kind", ", ".join(f"`{kind}`" for kind in KINDS), NEEDED, "kind of the filter"),
+    *(
+        Key(name, f"{_form(n)}, {n.low:g} to {n.high:g}", f"required of `{kind}`", n.meaning)
+        for kind, numbers in KINDS.items() for name, n in numbers.items()
+    ),
+)  # fmt: skip
 CLOCK = (
     Key("value", "number", NEEDED),
     Key("unit", "s", NEEDED),
@@ -161,7 +177,7 @@ def tables() -> str:
     parts.append(table("sensors.CHANNEL", SENSOR))
     channels = ", ".join(f"`{n}` {plain(u)}" for n, u in UNITS.items())
     parts.append(f"Channels and their units: {channels}.\n")
-    parts += [table("sensors.CHANNEL.clock", CLOCK)]
+    parts += [table("sensors.CHANNEL.clock", CLOCK), table("sensors.CHANNEL.filter", FILTER)]
     parts += [_loop_table(kind) for kind in LOOP_FIELDS]
     parts += [table("controller", CONTROLLER), table("effects[i]", EFFECT), table("GROUP.FIELD", QUANTITY)]
     return "\n".join(parts)
@@ -203,26 +219,26 @@ def sensors_from(body: Mapping[str, Any]) -> dict[str, Sensor]:
     only_keys(body, set(MEASURED), "sensors")
     sensors = {}
     for name, item in body.items():
-        fields = mapping(item, f"sensors.{name}")
-        only_keys(fields, names(SENSOR), f"sensors.{name}")
-        unit(fields.get("unit"), f"sensors.{name}.unit", UNITS[name])
-        noise, quantum = (
-            number(fields.get(k, 0.0), f"sensors.{name}.{k}", UNITS[name]) for k in ("noise", "quantum")
-        )
+        at = f"sensors.{name}"
+        fields = mapping(item, at)
+        only_keys(fields, names(SENSOR), at)
+        unit(fields.get("unit"), f"{at}.unit", UNITS[name])
+        noise, quantum = (number(fields.get(k, 0.0), f"{at}.{k}", UNITS[name]) for k in ("noise", "quantum"))
         if not (0 <= noise < math.inf and 0 <= quantum < math.inf):
-            raise RigError(
-                f"sensors.{name} = {noise:g}, {quantum:g} {plain(UNITS[name])}, expected finite values >= 0",
-                f"sensors.{name}",
-            )
-        floating, clock = switch(fields, f"sensors.{name}.zero_unknown"), _clock(fields, name)
-        late = _clock_rate(fields, name), _delay(fields, name)
-        sensors[name] = Sensor(noise, quantum, floating, *clock, *late)
+            stated = f"{noise:g}, {quantum:g} {plain(UNITS[name])}"
+            raise RigError(f"{at} = {stated}, expected finite values >= 0", at)
+        floating, clock = switch(fields, f"{at}.zero_unknown"), _clock(fields, f"{at}.clock")
+        rate = _stated(fields, f"{at}.clock_rate", "ppm", _FASTEST)
+        delay = _stated(fields, f"{at}.delay", "s", _OLDEST)
+        if delay < 0.0:
+            expected = "expected 0 or more: a reading is no younger"
+            raise RigError(f"{at}.delay.value = {delay:g} s, {expected}", f"{at}.delay")
+        sensors[name] = Sensor(noise, quantum, floating, *clock, rate, delay, _filter(fields, f"{at}.filter"))
     return sensors
 
 
-def _clock(fields: Mapping[str, Any], name: str) -> tuple[float, float]:
+def _clock(fields: Mapping[str, Any], field: str) -> tuple[float, float]:
     """Return value and doubt, s, from `clock: {value: …, unit: s, doubt: …}`; 0 where there is none."""
-    field = f"sensors.{name}.clock"
     item = mapping(fields.get("clock", {"value": 0.0, "unit": "s"}), field)
     only_keys(item, names(CLOCK), field)
     value = _small(item, field, "s", _LATEST)
@@ -232,22 +248,35 @@ def _clock(fields: Mapping[str, Any], name: str) -> tuple[float, float]:
     return value, doubt
 
 
-def _clock_rate(fields: Mapping[str, Any], name: str) -> float:
-    """Return ppm from `clock_rate: {value: …, unit: ppm}`; 0 where there is none."""
-    field = f"sensors.{name}.clock_rate"
-    item = mapping(fields.get("clock_rate", {"value": 0.0, "unit": "ppm"}), field)
+def _stated(fields: Mapping[str, Any], field: str, unit_name: str, limit: float) -> float:
+    """Return the value of `{value: …, unit: …}`; 0 where there is none."""
+    item = mapping(fields.get(field.split(".")[-1], {"value": 0.0, "unit": unit_name}), field)
     only_keys(item, names(CLOCK_RATE), field)
-    return _small(item, field, "ppm", _FASTEST)
+    return _small(item, field, unit_name, limit)
 
 
-def _delay(fields: Mapping[str, Any], name: str) -> float:
-    """Return s from `delay: {value: …, unit: s}`; 0 where there is none."""
-    field = f"sensors.{name}.delay"
-    item = mapping(fields.get("delay", {"value": 0.0, "unit": "s"}), field)
-    only_keys(item, names(CLOCK_RATE), field)
-    value = _small(item, field, "s", _OLDEST)
-    if value < 0.0:
-        raise RigError(f"{field}.value = {value:g} s, expected 0 or more: a reading is no younger", field)
+def _filter(fields: Mapping[str, Any], field: str) -> SensorFilter | None:
+    """Return the filter of a sensor from `filter: {kind: …, …}`."""
+    if "filter" not in fields:
+        return None
+    item = mapping(fields["filter"], field)
+    if (kind := text(item.get("kind", ""), f"{field}.kind")) not in KINDS:
+        raise RigError(f"{field}.kind = {quote(kind)}, expected one of {', '.join(KINDS)}", f"{field}.kind")
+    only_keys(item, {"kind", *KINDS[kind]}, field)
+    numbers = (_filter_number(item.get(key), n, f"{field}.{key}") for key, n in KINDS[kind].items())
+    return SensorFilter(kind, tuple(numbers))
+
+
+def _filter_number(item: Any, n: FilterNumber, field: str) -> float:
+    if n.unit != "1":
+        body = mapping(item, field, expected=_form(n))
+        only_keys(body, names(CLOCK_RATE), field)
+        unit(body.get("unit"), f"{field}.unit", n.unit)
+        item = body.get("value")
+    value = number(item, field, n.unit)
+    if not n.low <= value <= n.high or (n.whole and value % 1.0):
+        expected = with_unit(f"{'a whole number ' * n.whole}{n.low:g} to {n.high:g}", n.unit)
+        raise RigError(f"{with_unit(f'{field} = {value:g}', n.unit)}, expected {expected}", field)
     return value
 
 

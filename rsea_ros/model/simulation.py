@@ -24,6 +24,7 @@ from rsea_ros.model.extent import LARGEST, SMALLEST
 from rsea_ros.model.position_loop import STATES, control, loop_parameters, with_command
 from rsea_ros.model.propagator import OUTPUT_ROWS, propagator, start_map
 from rsea_ros.model.rig import END_NAMES, Rig
+from rsea_ros.model.sensor_filter import Running, SensorFilter
 from rsea_ros.model.step import OUTPUTS, Calls, Linear, StepInputs, StepState, advance
 from rsea_ros.records.record import Channel, FloatArray, Record
 
@@ -220,6 +221,8 @@ def _drive_outputs(
     spans = drive.simulated
     edges = [0.5 * (end + first) for (_, end), (first, _) in itertools.pairwise(spans)]
     is_mixed = machine.lags or machine.early < 0.5 or drive.mixes
+    filters = {n: known for n, known in rig.filters().items() if n in channels}
+    passed = {n: known for n, known in filters.items() if not known.is_sampled}
     for part, (first, end) in enumerate(spans):
         held = drive.command[first:end] if drive.jumps else np.zeros(end - first)
         within = np.zeros((end - first, 4)) if is_mixed else NOTHING_WITHIN
@@ -230,15 +233,35 @@ def _drive_outputs(
         if on_angle:
             steady = _without_noise(drive, out[1:, 0], first, end) * rig["gear.ratio"]
             out = _over_span(machine, rig, drive, steady, within, first, end)
+        begins = [0, *(k - first for k, _ in drive.restarts if first < k < end)]
+        _pass_steps(machine, drive, out, passed, within, begins)
         for at, sampled in zip(wanted, results, strict=True):
             for n, k in channels.items():
                 inside = np.searchsorted(edges, at[n]) == part if edges else slice(None)
                 since = at[n][inside] - first
-                read = sample(n, out[:, k], since, held, within, early=machine.early, lags=machine.lags)
-                if len(within) and (kick := _kick(machine, n)) != 0.0:
+                name = "" if n in passed else n  # what has passed a filter does not jump
+                read = sample(name, out[:, k], since, held, within, early=machine.early, lags=machine.lags)
+                if len(within) and n not in passed and (kick := _kick(machine, n)) != 0.0:
                     read += kick * drive.step * _beside_mean(within, since)
+                if n in filters and n not in passed and len(read) > 1:
+                    period = drive.step * float(np.median(np.diff(at[n])))
+                    read = filters[n].over(read, period, [0, *np.searchsorted(since, begins[1:])])
                 sampled[n][inside] = read
     return results
+
+
+def _pass_steps(
+    machine: Machine, drive: Drive, out: FloatArray, filters: Mapping[str, SensorFilter], within: FloatArray,
+    begins: Sequence[int],
+) -> None:  # fmt: skip
+    """Replace channels at the ends of steps by what has passed their filters in continuous time."""
+    for n, known in filters.items():
+        values, held = out[:, OUTPUTS.index(n)], n == "motor_torque" and not machine.lags
+        if held and len(within):
+            mixed = np.flatnonzero(within[:, 1] != within[:, 2])
+            share = within[mixed, 2] / (within[mixed, 2] - within[mixed, 1])
+            values[1 + mixed] += share * (within[mixed, 3] - values[1 + mixed])  # the mean over the step
+        values[:] = known.over(values, drive.step, begins, held=held)
 
 
 def _without_noise(drive: Drive, simulated: FloatArray, first: int, end: int) -> FloatArray:
@@ -413,7 +436,8 @@ def synthesize(rig: Rig, command: Channel, *, seed: int = 0, noise: bool = True)
     rng = sensor_noise(seed)
     true = simulate(rig, blank_record)
     _check_bounded(rig, true)
-    measured = {n: Channel(stamps, measure(rig, n, true[n], rng) if noise else true[n]) for n in names}
+    chain = Filters(rig, period, period)
+    measured = {n: Channel(stamps, measure(rig, n, true[n], rng, chain) if noise else true[n]) for n in names}
     return blank_record.with_channels(**measured)
 
 
@@ -434,12 +458,56 @@ def sensor_noise(seed: int) -> np.random.Generator:
     return np.random.default_rng([seed, _SENSORS])
 
 
-def measure(rig: Rig, channel: str, value: FloatArray, rng: np.random.Generator) -> FloatArray:
-    """Return the readings of the rig's sensor for true values: noise added, rounded to its quantum."""
+class Filters:
+    """The filters of a rig's sensors, with what they remember, for a bench that is read sample by sample.
+
+    step: of the simulation, period: between readings, s. held: the current is, within a step. All begins at
+    rest.
+    """
+
+    def __init__(self, rig: Rig, step: float, period: float, *, held: bool = True) -> None:
+        self._steps, self._samples, self._noise = {}, {}, {}
+        for n, known in rig.filters().items():
+            self._noise[n] = Running(known.coefficients(period, held=True))
+            if known.is_sampled:
+                self._samples[n] = Running(known.coefficients(period))
+                continue
+            self._steps[n] = Running(known.coefficients(step, held=held and n == "motor_torque"))
+            self._steps[n](np.zeros(1))
+
+    def pass_steps(self, out: FloatArray) -> None:
+        """Replace OUTPUTS at the ends of steps, a row each, by what has passed filters in continuous time."""
+        for n, running in self._steps.items():
+            out[:, OUTPUTS.index(n)] = running(out[:, OUTPUTS.index(n)])
+
+    def pass_sample(self, values: FloatArray) -> None:
+        """Replace OUTPUTS of a sample by what has passed filters that act at the samples."""
+        for n, running in self._samples.items():
+            values[[OUTPUTS.index(n)]] = running(values[[OUTPUTS.index(n)]])
+
+    def noise(self, channel: str, noise: FloatArray) -> FloatArray:
+        """Return what a channel's filter passes of the noise of its samples, of its shape."""
+        if channel not in self._noise:
+            return noise
+        return self._noise[channel](np.atleast_1d(noise)).reshape(np.shape(noise))
+
+
+def measure(
+    rig: Rig, channel: str, value: FloatArray, rng: np.random.Generator, filters: Filters | None = None
+) -> FloatArray:
+    """Return the readings of the rig's sensor for what its filter passes of true values.
+
+    Noise is added that has passed the filter too, and the sum rounded to the quantum. filters: needed where
+    the rig states one.
+    """
     sensor = rig.sensors.get(channel)
     if sensor is None:
         return value
-    noisy = value + sensor.noise * rng.standard_normal(np.shape(value))
+    noise = sensor.noise * rng.standard_normal(np.shape(value))
+    if sensor.filter is not None:
+        assert filters is not None
+        noise = filters.noise(channel, noise)
+    noisy = value + noise
     return np.round(noisy / sensor.quantum) * sensor.quantum if sensor.quantum > SMALLEST else noisy
 
 
@@ -463,6 +531,7 @@ class Plant:
         self._seen = [k for k, name in enumerate(OUTPUTS) if noise and name in rig.sensors]
         sensors = [rig.sensors[OUTPUTS[k]] for k in self._seen]
         self._noises, quanta = np.array([s.noise for s in sensors]), np.array([s.quantum for s in sensors])
+        self._filtered = [i for i, s in enumerate(sensors) if s.filter]
         self._rounds = quanta > SMALLEST
         self._quanta = np.where(self._rounds, quanta, 1.0)
         self._count = steps_per_sample(1.0 / rate)
@@ -474,15 +543,22 @@ class Plant:
     def reset(self) -> None:
         """Go back to rest, at time zero."""
         self._machine = build(self._rig, self._step, 60.0)
+        held = not self._machine.lags
+        self._filters = Filters(self._rig, self._step, self._count * self._step, held=held)
         self._time = 0.0
 
     def step(self, command: float) -> PlantSample:
         """Hold a command (N m) for one sample period and return the measurement at its end."""
         run(self._machine, np.full(self._count, command), self._out, start=self._time)
         self._time += self._count * self._step
+        self._filters.pass_steps(self._out)
         values = self._out[-1]
+        self._filters.pass_sample(values)
         if self._seen:  # as `measure`, of all channels at once: a study takes 50 000 samples
-            noisy = values[self._seen] + self._noises * self._rng.standard_normal(len(self._seen))
+            noise = self._noises * self._rng.standard_normal(len(self._seen))
+            for i in self._filtered:
+                noise[i] = self._filters.noise(OUTPUTS[self._seen[i]], noise[i])
+            noisy = values[self._seen] + noise
             values[self._seen] = np.where(self._rounds, np.round(noisy / self._quanta) * self._quanta, noisy)
         position, velocity, torque, ft, deflection = values.tolist()
         return PlantSample(position, velocity, torque, math.nan if self._rig.rigid_spring else ft, deflection)
