@@ -108,7 +108,8 @@ def as_often_as_commands(case: Case) -> Case:
     if not isinstance(drive, Drive):
         return case
     period = drive.hold * drive.step
-    every = {n: slice(None, None, n in case.whole or _samples_in(period, t)) for n, t in case.t.items()}
+    whole = {n for n, known in case.filters.items() if known.is_sampled}
+    every = {n: slice(None, None, 1 if n in whole else _samples_in(period, t)) for n, t in case.t.items()}
     thinner = replace(drive, at={n: at[every[n]] for n, at in drive.at.items()})
     return case.keep(every, thinner)
 
