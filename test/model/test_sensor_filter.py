@@ -1,4 +1,4 @@
-"""Known filters of sensors against slow plain ones: lsim on a fine grid, loops that know no formula of ours."""
+"""Known filters of sensors against slow plain ones: lsim on a fine grid, loops without our formulas."""
 
 from __future__ import annotations
 
@@ -86,7 +86,8 @@ def expected(kind, channel):
     if channel == "motor_torque":
         u = np.append(np.repeat(COMMAND.y, FINE), 0.0)
     else:
-        u = simulate(RIG, Record({"command": COMMAND, channel: Channel(t, np.zeros(len(t)))}), refine=4)[channel]
+        asked = Record({"command": COMMAND, channel: Channel(t, np.zeros(len(t)))})
+        u = simulate(RIG, asked, refine=4)[channel]
     if kind == "one_pole":
         system = [1.0], [NUMBERS[kind][0], 1.0]
     else:
