@@ -210,8 +210,9 @@ def pairs_of(record: Record, rig: Rig) -> tuple[Pair, ...]:
 
 
 def _behind_all(record: Record, law: Law, rig: Rig) -> Record:
-    """Return the channels of a law each behind the known filters of the others, which keeps what ties them."""
-    names, behind = {law.y, law.x, law.less or law.y}, {}
+    """Return the channels of a law, each behind the known filters of the others: their law is the same."""
+    names = {law.y, law.x, law.less or law.y}
+    behind: dict[str, Channel] = {}
     for other, known in rig.filters().items():
         for n in names - {other} if other in names else ():
             c, t = behind.get(n, record[n]), record[other].t

@@ -46,7 +46,8 @@ def ours(rig: Rig, command: FloatArray) -> dict[str, FloatArray]:
 
     command: N m, or target rad of a rig with a position loop, at RATE.
     """
-    t, rig = np.arange(len(command)) / RATE, replace(rig, sensors={})
+    t = np.arange(len(command)) / RATE
+    rig = replace(rig, sensors={n: replace(s, delay=0.0, filter=None) for n, s in rig.sensors.items()})
     driven = "command" if rig.loop is None else "reference"
     names = [name for name in CHANNELS if rig.measures(name)]
     asked = {name: Channel(t, np.zeros(len(t))) for name in names}

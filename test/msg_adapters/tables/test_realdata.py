@@ -59,8 +59,8 @@ def test_sea_gamma_has_one_spring_behind_two_sensors():
 def test_sea_gamma_behind_its_known_filters_is_predicted_where_it_took_no_part():
     """Values fitted to the run at 5 N m, held out both at 3: what is left, and twice as much without them.
 
-    The F/T pole is that of the bare motor's steps; the tracker is `init_filter` of the authors' program (filterpy:
-    F of a whole sample, Q_discrete_white_noise of 1 ms and 0.13, R 0.1), by its Riccati equation.
+    The F/T pole is that of the bare motor's steps; the tracker is `init_filter` of the authors' program
+    (filterpy: F of a whole sample, Q_discrete_white_noise of 1 ms and 0.13, R 0.1), by its Riccati equation.
     """
     f, dt = np.array([[1.0, 1.0], [0.0, 1.0]]), 1e-3
     q = 0.13 * np.array([[dt**4 / 4.0, dt**3 / 2.0], [dt**3 / 2.0, dt**2]])
