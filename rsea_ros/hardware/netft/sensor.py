@@ -120,6 +120,11 @@ class ForceTorqueSensor:
         """The largest values that it measures, N and N m; inf where its page states none."""
         return self._calibration.range
 
+    @property
+    def low_pass(self) -> str:
+        """The number of the low pass that its records have passed, 0 for none; empty where it states none."""
+        return self._calibration.low_pass
+
     def gather(self) -> None:
         """Fetch received records, so that the next `take` has little to do."""
         self._receiver.drain()
