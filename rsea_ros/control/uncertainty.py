@@ -20,16 +20,7 @@ from itertools import product
 import numpy as np
 import numpy.typing as npt
 
-from rsea_ros.control.law import (
-    FT,
-    POSITION,
-    VELOCITY,
-    Sampled,
-    check_controllable,
-    responses,
-    sample_rig,
-    z_of,
-)
+from rsea_ros.control.law import FT, Sampled, check_controllable, responses, sample_rig, z_of
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.effects.signal_table import Port
 from rsea_ros.errors import ParameterError
@@ -96,7 +87,7 @@ def lag_responses(rig: Rig, plant: Sampled, hz: FloatArray) -> tuple[ComplexArra
             path = path * factor
         else:
             response[FT if effect.port == Port.SENSOR else slice(None)] *= factor
-    for row, name in ((FT, "ft"), (VELOCITY, "velocity"), (POSITION, "position")):
+    for row, name in enumerate(("ft", "velocity", "position")):  # those of `Sampled`
         if name in rig.sensors:
             response[row] *= rig.sensors[name].response(hz, plant.period)
     return response, path

@@ -30,22 +30,14 @@ class SimulatedDevice:
     protection = Protection(PROCESS)
 
     def __init__(
-        self,
-        rig: Rig,
-        rate: float,
-        *,
-        seed: int = 0,
-        noise: bool = True,
-        duration: float = 60.0,
+        self, rig: Rig, rate: float, *, seed: int = 0, noise: bool = True, duration: float = 60.0,
         clock: Callable[[], int] | None = None,
-    ) -> None:
+    ) -> None:  # fmt: skip
         self._rig, self._noise, self._clock = rig, noise, clock or _steady_clock()
         self._rng = np.random.default_rng(seed)
-        self._rate, self._per_second = rate, rate * steps_per_sample(1.0 / rate)
+        self._period, self._per_second = 1.0 / rate, rate * steps_per_sample(1.0 / rate)
         self._duration = duration
-        self._machine = build(rig, 1.0 / self._per_second, duration)
-        self._filters = self._new_filters()
-        self._values = np.zeros(len(OUTPUTS))
+        self._build()
         self._start: int | None = None
         self._steps, self._torque = 0, 0.0
         self._writes: list[tuple[int, float]] = []
@@ -54,21 +46,19 @@ class SimulatedDevice:
     def open(self) -> None:
         """Start at rest, now, also after a `close`."""
         if self._steps:
-            self._machine = build(self._rig, 1.0 / self._per_second, self._duration)
-            self._filters = self._new_filters()
-            self._values = np.zeros(len(OUTPUTS))
+            self._build()
         self._steps, self._torque, self._writes = 0, 0.0, []
         self._start = self._clock()
 
-    def _new_filters(self) -> Filters:
-        return Filters(self._rig, 1.0 / self._per_second, 1.0 / self._rate, held=not self._machine.lags)
+    def _build(self) -> None:
+        step = 1.0 / self._per_second
+        self._machine, self._values = build(self._rig, step, self._duration), np.zeros(len(OUTPUTS))
+        self._filters = Filters(self._rig, step, self._period, held=not self._machine.lags)
 
     def read(self) -> State:
         """Advance to now and measure."""
         self._advance()
-        true = self._values.copy()
-        self._filters.pass_sample(true)
-        values = {name: self._measure(name, true[i]) for i, name in enumerate(OUTPUTS)}
+        values = {name: self._measure(name, self._values[i]) for i, name in enumerate(OUTPUTS)}
         stamp = self._instant(self._steps)
         wrench = None if self._rig.rigid_spring else (0.0, 0.0, 0.0, 0.0, 0.0, values["ft"])
         deflection = values["deflection"] if "deflection" in self._rig.sensors else math.nan
@@ -124,7 +114,7 @@ class SimulatedDevice:
         held = self._held_torque(begin, count)
         out = np.empty((count, len(OUTPUTS)))
         run(self._machine, held, out, start=first / self._per_second)
-        self._filters.pass_steps(out)
+        self._filters.apply(out)
         self._steps, self._values = first + count, out[-1]
 
     def _held_torque(self, begin: int, count: int) -> FloatArray:

@@ -81,12 +81,9 @@ _SHARED_BANDS = (0.4, 4.0, 14.0, 50.0)
 
 
 def is_noise(
-    case: Case,
-    outputs: Mapping[str, FloatArray],
-    channel: str,
-    ratio: float = 1.0,
+    case: Case, outputs: Mapping[str, FloatArray], channel: str, ratio: float = 1.0,
     rule: NoiseSettings = NOISE,
-) -> bool:
+) -> bool:  # fmt: skip
     """Return whether the residual of a channel is noise of its sensor, coloured or not.
 
     outputs: of the fitted model, by channel. ratio: of the gear, rotor over output.

@@ -104,9 +104,7 @@ def case_from(
     good = {n: ~masked[n] if masked and n in masked else np.ones(len(record[n]), bool) for n in channels}
     start = float(record["command"].t[0]) + SKIPPED_START
     known = {n: outside_gaps(record, record[n].t, SKIPPED_START) for n in channels}
-    counts = {
-        n: good[n] & known[n] & np.isfinite(record[n].y) & (record[n].t >= start) for n in channels
-    }
+    counts = {n: good[n] & known[n] & np.isfinite(record[n].y) & (record[n].t >= start) for n in channels}
     heard = record.with_channels(**{n: _counted_span(record[n], counts[n]) for n in channels})
     return Case(
         drive=drive_of(record, rig),

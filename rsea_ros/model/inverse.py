@@ -21,7 +21,7 @@ from rsea_ros.errors import IdentificationError
 from rsea_ros.model.drive import gaps
 from rsea_ros.model.equations import mechanics, with_structure
 from rsea_ros.model.extent import SKIPPED_START, check_extent, check_slow
-from rsea_ros.model.rig import Rig
+from rsea_ros.model.rig import Rig, check_unfiltered
 from rsea_ros.model.simulation import Machine, build
 from rsea_ros.model.step import Calls, call_port
 from rsea_ros.records.holds import AT_EDGE
@@ -172,9 +172,7 @@ def smooth(values: FloatArray, period: float) -> FloatArray:
 
 def inverse_torque(rig: Rig, motion: Motion) -> FloatArray:
     """Return the motor torque that a motion takes, N m, filtered like the motion, shape of motion.t."""
-    if filtered := [n for n in rig.filters() if n in ("position", "motor_torque")]:
-        what = f"expected none: without a spring nothing takes it from the measured {' and '.join(filtered)}"
-        raise IdentificationError(f"rig {rig.name}: sensors.{filtered[0]}.filter, {what}")
+    check_unfiltered(rig, ("position", "motor_torque"), "a rig without a spring, judged by what is measured")
     rig_as_is = with_structure(rig)
     m = mechanics(rig_as_is, linear_gravity=False)
     if m.order != 1 or "housing_end" not in rig.clamped:

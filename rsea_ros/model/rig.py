@@ -7,7 +7,7 @@ FIELDS is the only list of the values that a rig may have, by the dotted names o
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Literal
@@ -353,6 +353,12 @@ def check_two_torques(rig: Rig) -> None:
     """Raise RigError for a rig without a spring: it has one torque, not one on either side."""
     if rig.rigid_spring:
         raise RigError(f"rig {rig.name}: spring.rigid = True, expected a spring with a torque on either side")
+
+
+def check_unfiltered(rig: Rig, channels: Collection[str], what: str) -> None:
+    """Raise RigError where a channel has a known filter that something (what) cannot serve."""
+    for at in (f"sensors.{n}.filter" for n in rig.filters() if n in channels):
+        raise RigError(f"rig {rig.name}: {at}, expected none for {what}", at)
 
 
 def _check_trains(rig: Rig) -> None:

@@ -43,7 +43,7 @@ from rsea_ros.model.rig import (
     Sensor,
     check_value,
 )
-from rsea_ros.model.sensor_filter import KINDS, FilterNumber, SensorFilter
+from rsea_ros.model.sensor_filter import KINDS, SensorFilter
 from rsea_ros.model.train import TRAINS
 from rsea_ros.records.record import MEASURED, UNITS
 
@@ -66,20 +66,9 @@ _MEANINGS = {
     "housing.inertia": "inertia of the housing, if a proximal spring holds it",
     "proximal_spring.stiffness": "stiffness between the housing and its end",
     "proximal_spring.damping": "damping of that spring",
-    **{
-        f"{end}.{key}": meaning
-        for end in END_NAMES
-        for key, meaning in _END.items()
-    },
+    **{f"{end}.{key}": meaning for end in END_NAMES for key, meaning in _END.items()},
     "spring_end.above_sensor": "share of its inertia between the spring and the F/T sensor",
 }  # fmt: skip
-
-
-def _form(n: FilterNumber) -> str:
-    """Return how a number of a filter is written."""
-    return "number" if n.unit == "1" else f"{{value: …, unit: {n.unit}}}"
-
-
 _TRAINS = ", ".join(f"`{train}`" for train in TRAINS)
 GROUPS = sorted({name.split(".")[0] for name in FIELDS} - {"controller"})
 SWITCHES: Mapping[str, Sequence[Key]] = {
@@ -101,12 +90,7 @@ TOP = (
     Key("known", "list of names such as `gear.ratio`", "none", "values that no fit may change"),
     Key("sensors", "mapping, a key for each channel", "perfect sensors", "noise, steps, clocks, filters"),
     Key("controller", "mapping", "none", "position loop that was active during the record, see below"),
-    Key(
-        "hold",
-        "`zero`, `first` or `band`",
-        "`zero`",
-        "between commands: the last one, a line, a band-limited curve",
-    ),
+    Key("hold", "`zero`, `first`, `band`", "`zero`", "between commands: held, a line, band-limited"),
     Key("effects", "list", "none", "active effects of the catalogue"),
     *(Key(group, "mapping", NEEDED if group == "rotor" else "defaults", "see below") for group in GROUPS),
 )
@@ -128,13 +112,11 @@ SENSOR = (
     Key("delay", "{value: …, unit: s}, from 0, below 0.2 s", "0 s", "age of the reading at its stamp, known"),
     Key("filter", "mapping, see below", "none", "filter that the reading has passed, known"),
 )
-FILTER = (
-    Key("kind", ", ".join(f"`{kind}`" for kind in KINDS), NEEDED, "kind of the filter"),
-    *(
-        Key(name, f"{_form(n)}, {n.low:g} to {n.high:g}", f"required of `{kind}`", n.meaning)
-        for kind, numbers in KINDS.items() for name, n in numbers.items()
-    ),
-)  # fmt: skip
+FILTER = [Key("kind", ", ".join(f"`{kind}`" for kind in KINDS), NEEDED, "kind of the filter")]
+FILTER += [
+    Key(key, f"{{value: …, unit: {unit_name}}}, {low:g} to {high:g}", f"`{kind}`: required", meaning)
+    for kind, numbers in KINDS.items() for key, (unit_name, low, high, meaning) in numbers.items()
+]  # fmt: skip
 CLOCK = (
     Key("value", "number", NEEDED),
     Key("unit", "s", NEEDED),
@@ -239,55 +221,46 @@ def sensors_from(body: Mapping[str, Any]) -> dict[str, Sensor]:
 
 def _clock(fields: Mapping[str, Any], field: str) -> tuple[float, float]:
     """Return value and doubt, s, from `clock: {value: …, unit: s, doubt: …}`; 0 where there is none."""
-    item = mapping(fields.get("clock", {"value": 0.0, "unit": "s"}), field)
-    only_keys(item, names(CLOCK), field)
-    value = _small(item, field, "s", _LATEST)
-    doubt = number(item.get("doubt", CLOCK_DOUBT), f"{field}.doubt", "s")
+    value = _stated(fields, field, "s", _LATEST, CLOCK)
+    doubt = number(fields.get("clock", {}).get("doubt", CLOCK_DOUBT), f"{field}.doubt", "s")
     if not 0.0 < doubt < _LATEST:
         raise RigError(f"{field}.doubt = {doubt:g} s, expected more than 0, less than {_LATEST:g} s", field)
     return value, doubt
 
 
-def _stated(fields: Mapping[str, Any], field: str, unit_name: str, limit: float) -> float:
-    """Return the value of `{value: …, unit: …}`; 0 where there is none."""
-    item = mapping(fields.get(field.split(".")[-1], {"value": 0.0, "unit": unit_name}), field)
-    only_keys(item, names(CLOCK_RATE), field)
-    return _small(item, field, unit_name, limit)
+def _stated(
+    fields: Mapping[str, Any], field: str, unit_name: str, limit: float, keys: Sequence[Key] = CLOCK_RATE
+) -> float:
+    """Return the value of `{value: …, unit: …}`; 0 where there is none. Raises RigError beyond a limit."""
+    item = fields.get(field.split(".")[-1], {"value": 0.0, "unit": unit_name})
+    value = _value(item, field, unit_name, keys)
+    if not abs(value) < limit:
+        expected = f"expected less than {limit:g} {unit_name} either way"
+        raise RigError(f"{field}.value = {value:g} {unit_name}, {expected}", field)
+    return value
+
+
+def _value(item: Any, field: str, unit_name: str, keys: Sequence[Key] = CLOCK_RATE) -> float:
+    body = mapping(item, field, expected=f"{{value: …, unit: {unit_name}}}")
+    only_keys(body, names(keys), field)
+    unit(body.get("unit"), f"{field}.unit", unit_name)
+    return number(body.get("value"), f"{field}.value", unit_name)
 
 
 def _filter(fields: Mapping[str, Any], field: str) -> SensorFilter | None:
     """Return the filter of a sensor from `filter: {kind: …, …}`."""
     if "filter" not in fields:
         return None
-    item = mapping(fields["filter"], field)
+    item, numbers = mapping(fields["filter"], field), []
     if (kind := text(item.get("kind", ""), f"{field}.kind")) not in KINDS:
         raise RigError(f"{field}.kind = {quote(kind)}, expected one of {', '.join(KINDS)}", f"{field}.kind")
     only_keys(item, {"kind", *KINDS[kind]}, field)
-    numbers = (_filter_number(item.get(key), n, f"{field}.{key}") for key, n in KINDS[kind].items())
+    for key, (unit_name, low, high, meaning) in KINDS[kind].items():
+        numbers.append(_value(item.get(key), f"{field}.{key}", unit_name))
+        if not low <= numbers[-1] <= high or (key == "samples" and numbers[-1] % 1.0):
+            expected = f"expected {with_unit(f'{low:g} to {high:g}', unit_name)}: {meaning}"
+            raise RigError(f"{field}.{key} = {numbers[-1]:g}, {expected}", f"{field}.{key}")
     return SensorFilter(kind, tuple(numbers))
-
-
-def _filter_number(item: Any, n: FilterNumber, field: str) -> float:
-    if n.unit != "1":
-        body = mapping(item, field, expected=_form(n))
-        only_keys(body, names(CLOCK_RATE), field)
-        unit(body.get("unit"), f"{field}.unit", n.unit)
-        item = body.get("value")
-    value = number(item, field, n.unit)
-    if not n.low <= value <= n.high or (n.whole and value % 1.0):
-        expected = with_unit(f"{'a whole number ' * n.whole}{n.low:g} to {n.high:g}", n.unit)
-        raise RigError(f"{with_unit(f'{field} = {value:g}', n.unit)}, expected {expected}", field)
-    return value
-
-
-def _small(item: Mapping[str, Any], field: str, unit_name: str, limit: float) -> float:
-    """Return the value of `{value: …, unit: …}`. Raises RigError where it is not within the limit."""
-    unit(item.get("unit"), f"{field}.unit", unit_name)
-    value = number(item.get("value"), f"{field}.value", unit_name)
-    if not abs(value) < limit:
-        expected = f"expected less than {limit:g} {unit_name} either way"
-        raise RigError(f"{field}.value = {value:g} {unit_name}, {expected}", field)
-    return value
 
 
 def check_effects(settings: Sequence[EffectSetting]) -> None:

@@ -14,7 +14,7 @@ import rsea_ros as rsea
 from rsea_ros.errors import RseaError
 from rsea_ros.identification.frequency_response import model_response, responses_of
 from rsea_ros.model.rig import Sensor
-from rsea_ros.model.sensor_filter import KINDS, SensorFilter, steady_gains
+from rsea_ros.model.sensor_filter import KINDS, SensorFilter
 from rsea_ros.model.simulation import Plant, simulate, synthesize
 from rsea_ros.records.record import Channel, Record
 
@@ -127,7 +127,8 @@ def test_a_filter_of_continuous_time_sees_what_a_command_does_within_a_step():
 def test_the_steady_gains_are_those_of_the_riccati_equation(index):
     f, g = np.array([[1.0, 1.0], [0.0, 1.0]]), np.array([[0.5], [1.0]])
     p = solve_discrete_are(f.T, np.array([[1.0], [0.0]]), index**2 * g @ g.T, np.eye(1))
-    assert steady_gains(index) == pytest.approx(p[:, 0] / (p[0, 0] + 1.0), rel=1e-6)
+    (alpha, lead), _ = SensorFilter("kalman", (index,)).coefficients(1.0)
+    assert (alpha, alpha + lead) == pytest.approx(tuple(p[:, 0] / (p[0, 0] + 1.0)), rel=1e-6)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -175,7 +176,7 @@ def test_a_measured_response_is_that_before_the_filter(kind):
 
 def test_what_cannot_serve_a_filter_says_so():
     drive = behind("one_pole", "position", rig=rsea.load_rig("bare_drive"))
-    with pytest.raises(RseaError, match=r"sensors\.position\.filter, expected none: without a spring"):
+    with pytest.raises(RseaError, match=r"sensors\.position\.filter, expected none for a rig without"):
         rsea.predict(rsea.simulate(drive, 10.0 * np.sin(np.arange(600) / 40.0), RATE), drive)
     with pytest.raises(RseaError, match=r"sensors\.ft\.filter, expected none for the observer"):
         rsea.Observer(behind("kalman", "ft"))

@@ -91,13 +91,14 @@ JUMPS = {"restarted": "the sensor was restarted", "frozen": "ft_sequence stands 
 
 
 class ForceTorqueSensor:
-    """One sensor. noise: standard deviation of each axis at rest, N and N m."""
+    """One sensor. noise: standard deviation of each axis at rest, N and N m. low_pass: as its page says."""
 
     def __init__(self, settings: SensorConnection) -> None:
         self._settings = settings
         self._receiver = DatagramReceiver(settings.host, settings.port)
         self._calibration = Calibration(1.0, 1.0)
         self.noise: Wrench = (0.0,) * 6
+        self.low_pass = ""
         self._quiet = 0
         self._stillness = Stillness()
         self._seen: Mapping[str, int] = {}
@@ -105,6 +106,7 @@ class ForceTorqueSensor:
     def open(self) -> None:
         """Get the calibration, start the stream, measure the noise. Raises DeviceError."""
         self._calibration = fetch(self._settings.host, self._settings.page_port)
+        self.low_pass = self._calibration.low_pass
         self._receiver.open()
         try:
             arrivals = self._collect()
@@ -119,11 +121,6 @@ class ForceTorqueSensor:
     def range(self) -> Wrench:
         """The largest values that it measures, N and N m; inf where its page states none."""
         return self._calibration.range
-
-    @property
-    def low_pass(self) -> str:
-        """The number of the low pass that its records have passed, 0 for none; empty where it states none."""
-        return self._calibration.low_pass
 
     def gather(self) -> None:
         """Fetch received records, so that the next `take` has little to do."""

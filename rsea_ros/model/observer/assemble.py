@@ -13,7 +13,6 @@ from scipy.linalg import matrix_balance
 
 from rsea_ros.effects import signal_table as st
 from rsea_ros.effects.catalogue import effect_named
-from rsea_ros.errors import RigError
 from rsea_ros.model import outputs
 from rsea_ros.model.drive import LONGEST_STEP
 from rsea_ros.model.equations import PORTS, with_structure
@@ -30,7 +29,7 @@ from rsea_ros.model.observer.filter import (
 )
 from rsea_ros.model.observer.signal_noise import Noise
 from rsea_ros.model.propagator import state_space
-from rsea_ros.model.rig import Rig
+from rsea_ros.model.rig import Rig, check_unfiltered
 from rsea_ros.model.simulation import Machine, build
 from rsea_ros.model.step import Calls
 from rsea_ros.model.transfer import read
@@ -95,13 +94,8 @@ def without_delay(rig: Rig) -> tuple[Rig, float]:
 def assemble(
     rig: Rig, noise: Noise, *, hold: float, duration: float, learns: bool
 ) -> tuple[FilterModel, FilterState]:
-    """Return the model and the state at rest with nothing known. hold, duration: s; learns: filter.py.
-
-    Raises RigError for a sensor that has a filter: the covariance has no state of it.
-    """
-    for name in rig.filters().keys() & {"position", "ft", "motor_torque"}:
-        what = "expected none for the observer, whose Kalman filter has no state of it"
-        raise RigError(f"rig {rig.name}: sensors.{name}.filter, {what}", f"sensors.{name}.filter")
+    """Return the model and the state at rest with nothing known. hold, duration: s; learns: filter.py."""
+    check_unfiltered(rig, ("position", "ft", "motor_torque"), "the observer, which has no state of it")
     machine, linear = build(rig, LONGEST_STEP, duration), linear_model(with_structure(rig))
     n, size = linear.order, len(linear.start)
     measured = np.zeros((2, size))
