@@ -130,6 +130,10 @@ class Quantity:
 _UNSTATED = Quantity(0.0)
 
 
+_SLOWLY = 1e-3
+"""Hz, against every filter."""
+
+
 @dataclass(frozen=True)
 class Sensor:
     """Noise (one sigma) and quantum of a channel, in the channel's unit (see signals.UNITS).
@@ -159,6 +163,10 @@ class Sensor:
         """Return its delay and filter at frequencies, Hz, shape (n,). period: of its samples, s."""
         late: ComplexArray = np.exp(-2j * np.pi * self.delay * hz)
         return late if self.filter is None else late * self.filter.response(hz, period)
+
+    def lag(self, period: float) -> float:
+        """Return by how much a slow reading is late by delay and filter, s. period: of its samples, s."""
+        return float(-np.angle(self.response(np.array([_SLOWLY]), period))[0] / (2.0 * math.pi * _SLOWLY))
 
 
 @dataclass(frozen=True)

@@ -174,6 +174,15 @@ def test_a_measured_response_is_that_before_the_filter(kind):
     assert np.quantile(np.abs(off), 0.9) < 0.05
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_its_lag_is_by_how_much_a_ramp_is_late(kind):
+    """A driver allows for it where it compares sensors."""
+    known, t = SensorFilter(kind, NUMBERS[kind]), np.arange(3000) / RATE
+    late = t[-1] - known.over(t, 1.0 / RATE)[-1]
+    assert Sensor(filter=known, delay=4e-3).lag(1.0 / RATE) == pytest.approx(late + 4e-3, abs=1e-6)
+    assert Sensor(delay=4e-3).lag(1.0 / RATE) == pytest.approx(4e-3)
+
+
 def test_what_cannot_serve_a_filter_says_so():
     drive = behind("one_pole", "position", rig=rsea.load_rig("bare_drive"))
     with pytest.raises(RseaError, match=r"sensors\.position\.filter, expected none for a rig without"):
