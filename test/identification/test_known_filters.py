@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import rsea_ros as rsea
+from rsea_ros.checks.pairs import pairs_of
 from rsea_ros.diagnosis.data_split import as_often_as_commands
 from rsea_ros.identification.identify import identify
 from rsea_ros.identification.noise_level import is_noise
@@ -112,6 +113,18 @@ def test_noise_that_a_filter_has_coloured_is_noise(kind, numbers):
     damping = "rotor.reflected_damping"
     wrong = simulate(rig.with_values({damping: 1.01 * rig[damping]}), record)
     assert not any(is_noise(case, wrong, n) for n in rig.sensors)
+
+
+def test_two_sensors_are_compared_behind_the_filters_of_both():
+    """Their law is the spring's; without, a right spring looked wrong."""
+
+    def spring(rig):
+        found = pairs_of(bench_record(101), rig)
+        return next(pair for pair in found if (pair.law.y, pair.law.x) == ("ft", "deflection"))
+
+    known, plain = spring(KNOWN), spring(PLAIN)
+    assert known.fits and known.factor * RIG["spring.stiffness"] == pytest.approx(K, rel=0.02)
+    assert not plain.fits or abs(plain.factor * RIG["spring.stiffness"] / K - 1.0) > 0.1
 
 
 def test_a_filter_at_the_samples_keeps_all_of_them():

@@ -11,11 +11,16 @@ from scipy.linalg import solve_discrete_are
 from scipy.signal import lsim
 
 import rsea_ros as rsea
+from rsea_ros.control.law import FT, sample_rig
+from rsea_ros.control.uncertainty import lag_responses
 from rsea_ros.errors import RseaError
+from rsea_ros.exports.others import omitted_sensors
+from rsea_ros.exports.verification import ours
 from rsea_ros.identification.frequency_response import model_response, responses_of
+from rsea_ros.identification.missing_torque import Injector
 from rsea_ros.model.rig import Sensor
 from rsea_ros.model.sensor_filter import KINDS, SensorFilter
-from rsea_ros.model.simulation import Plant, simulate, synthesize
+from rsea_ros.model.simulation import Plant, drive_of, simulate, synthesize
 from rsea_ros.records.record import Channel, Record
 
 RIG = rsea.load_rig("paper_high_impedance")
@@ -197,3 +202,35 @@ def test_a_filter_survives_its_file(tmp_path):
         rig = behind(kind, "ft", "velocity")
         rsea.save(rig, tmp_path / f"{kind}.yaml")
         assert rsea.load_rig(tmp_path / f"{kind}.yaml") == rig
+
+
+def test_exports_say_that_they_leave_a_filter_out_and_are_compared_without():
+    rig = behind("two_poles", "ft", delay=4e-3)
+    assert omitted_sensors(rig, "noise")["sensors.ft.filter"] == "two_poles; pass the output through it"
+    plain, compared = (ours(r, COMMAND.y[:100]) for r in (RIG, rig))
+    assert all(np.array_equal(plain[n], compared[n]) for n in plain)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_margins_of_a_controller_have_delay_and_filter(kind):
+    """Of the reading that is filtered, at the controller's rate, and of no other."""
+    hz, rig = np.array([0.5, 5.0, 40.0]), behind(kind, "ft", delay=4e-3)
+    (plain, _), (late, _) = (lag_responses(r, sample_rig(r, RATE), hz) for r in (RIG, rig))
+    passed = SensorFilter(kind, NUMBERS[kind]).response(hz, 1.0 / RATE) * np.exp(-2j * np.pi * hz * 4e-3)
+    assert late[FT] == pytest.approx(plain[FT] * passed)
+    assert np.array_equal(np.delete(late, FT, axis=0), np.delete(plain, FT, axis=0))
+
+
+@pytest.mark.parametrize("kind", ["one_pole", "average"])
+def test_the_answer_to_a_missing_torque_is_read_behind_the_filter(kind):
+    record, rig = synthesize(RIG, COMMAND, noise=False), behind(kind, "ft")
+    drive, stamps = drive_of(record, RIG), {"ft": record["ft"].t}
+    torque = np.sin(np.arange(len(drive.command)) / 40.0)
+    plain, got = (Injector(r, drive, stamps) for r in (RIG, rig))
+    if kind == "average":
+        want = np.array(list(averaged(plain.answers(torque, "gear")["ft"], 5.0)))
+        assert got.answers(torque, "gear")["ft"] == pytest.approx(want, abs=1e-9)
+        return
+    steps, t = plain.raw(torque, "gear")[:, 3], drive.step * np.arange(len(torque) + 1)
+    want = lsim(([1.0], [NUMBERS[kind][0], 1.0]), steps, t)[1]
+    assert got.raw(torque, "gear")[:, 3] == pytest.approx(want, abs=1e-9 * np.abs(want).max())
