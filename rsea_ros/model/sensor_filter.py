@@ -19,6 +19,7 @@ All pass a constant unchanged, and begin at rest at their first value.
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -63,6 +64,7 @@ class SensorFilter:
         b, a = (np.polyval(part[::-1], np.exp(-period * s)) for part in self.coefficients(period))
         return np.asarray(b / a)
 
+    @lru_cache(maxsize=64)  # noqa: B019  a small value, which a fit needs for every simulation
     def coefficients(self, period: float, *, held: bool = False) -> _Coefficients:
         """Return it at values a period (s) apart. held: each lasted since the one before."""
         match self.kind, self.numbers:

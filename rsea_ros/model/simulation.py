@@ -288,15 +288,13 @@ def over_span(
 
 def _pass_filters(machine: Machine, rig: Rig, out: FloatArray, within: FloatArray) -> None:
     """Let OUTPUTS at the ends of steps, those at the beginning first, pass the filters in continuous time."""
-    for n, known in rig.filters().items():
+    for n in (n for n, known in rig.filters().items() if not known.is_sampled):
         values, held = out[:, OUTPUTS.index(n)], n == "motor_torque" and not machine.lags
-        if known.is_sampled:
-            continue
         if held and len(within):  # the current's mean over the step
             mixed = np.flatnonzero(within[:, 1] != within[:, 2])
             share = within[mixed, 2] / (within[mixed, 2] - within[mixed, 1])
             values[1 + mixed] += share * (within[mixed, 3] - values[1 + mixed])
-        values[:] = known.over(values, machine.table[st.STEP], held=held)
+        values[:] = rig.filters()[n].over(values, machine.table[st.STEP], held=held)
 
 
 def _instants(rig: Rig, drive: Drive, channel: str, at: FloatArray) -> FloatArray:
