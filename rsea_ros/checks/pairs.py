@@ -202,10 +202,23 @@ def pairs_of(record: Record, rig: Rig) -> tuple[Pair, ...]:
     with np.errstate(all="ignore"):
         asked = tuple(laws(record, rig))
         parts = ((n.encode(), c.t.tobytes(), c.y.tobytes()) for n, c in record.channels.items())
-        kept = _kept(asked, blake2b(b"".join(chain.from_iterable(parts))).digest())
+        known = repr(rig.filters()).encode() if rig.filters() else b""
+        kept = _kept(asked, blake2b(known + b"".join(chain.from_iterable(parts))).digest())
         if not kept:
-            kept.append(tuple(p for law in asked for p in _parts(record, law)))
+            kept.append(tuple(p for law in asked for p in _parts(_behind_all(record, law, rig), law)))
         return kept[0]
+
+
+def _behind_all(record: Record, law: Law, rig: Rig) -> Record:
+    """Return the channels of a law, each behind the known filters of the others: their law is the same."""
+    names = {law.y, law.x, law.less or law.y}
+    behind: dict[str, Channel] = {}
+    for other, known in rig.filters().items():
+        for n in names - {other} if other in names else ():
+            c, t = behind.get(n, record[n]), record[other].t
+            y = known.over(np.interp(t, c.t, c.y), float(np.median(np.diff(t))))
+            behind[n] = Channel(t, y)
+    return record.with_channels(**behind) if behind else record
 
 
 @lru_cache(maxsize=32)

@@ -57,6 +57,8 @@ def _check(args: argparse.Namespace) -> int:
     say(f"noise stated for: {said}", indent=2)
     if old := [f"{n} ({1e3 * sensor.delay:g} ms)" for n, sensor in rig.sensors.items() if sensor.delay]:
         say(f"read late: {list_names(old)}", indent=2)
+    if filtered := [f"{n} ({known.kind})" for n, known in rig.filters().items()]:
+        say(f"read behind a filter: {list_names(filtered)}", indent=2)
     if not rig.free():
         say("give a value a spread (0.3: known to 30 %) if identify should estimate it", indent=2)
     return 0

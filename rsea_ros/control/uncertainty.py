@@ -87,6 +87,9 @@ def lag_responses(rig: Rig, plant: Sampled, hz: FloatArray) -> tuple[ComplexArra
             path = path * factor
         else:
             response[FT if effect.port == Port.SENSOR else slice(None)] *= factor
+    for row, name in enumerate(("ft", "velocity", "position")):  # those of `Sampled`
+        if name in rig.sensors:
+            response[row] *= rig.sensors[name].response(hz, plant.period)
     return response, path
 
 

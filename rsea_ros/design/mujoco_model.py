@@ -120,9 +120,7 @@ def model_element(rig: Rig, play: float = 0.0) -> xml.Element:
     root = xml.Element("mujoco", model=rig.name)
     xml.SubElement(root, "compiler", angle="radian")
     gravity = f"0 {-STANDARD_GRAVITY} 0"
-    xml.SubElement(
-        root, "option", timestep=f"{STEP:g}", integrator="RK4", gravity=gravity, tolerance="1e-12"
-    )
+    xml.SubElement(root, "option", timestep=f"{STEP:g}", integrator="RK4", gravity=gravity, tolerance="1e-12")
     is_stiff = math.isinf(rig["gear.stiffness"]) and not play
     parents = _bodies(rig, mesh, xml.SubElement(root, "worldbody"), is_stiff)
     _join(rig, mesh, parents, root, play)

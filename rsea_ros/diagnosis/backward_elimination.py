@@ -106,13 +106,9 @@ class ReducedModels:
         return self._fit(model, *without_effect(model.problem, model.solution.theta, name))
 
     def _with(
-        self,
-        model: Candidate,
-        rests: Mapping[str, Candidate],
-        trials: Sequence[Trial],
-        name: str,
+        self, model: Candidate, rests: Mapping[str, Candidate], trials: Sequence[Trial], name: str,
         rival: Effect,
-    ) -> Candidate | None:
+    ) -> Candidate | None:  # fmt: skip
         """Fit a model again with a rival, of the same size where that is one, in the place of a cause."""
         rest, old = rests[name], effect_named(name).main
         solution = rest.solution

@@ -189,11 +189,9 @@ def _loss(model: Scored, against: Scored) -> float:
 
 
 def verdict_of(
-    scores: Sequence[Score],
-    statuses: Sequence[Status | None] = (),
-    levels: FloorSettings = DEFAULT.floor,
+    scores: Sequence[Score], statuses: Sequence[Status | None] = (), levels: FloorSettings = DEFAULT.floor,
     faults: Sequence[Fault] = (),
-) -> Verdict:
+) -> Verdict:  # fmt: skip
     """Return the verdict of models, from the nominal one to the one with all causes.
 
     scores: on the test blocks, one a model. statuses: of the cause that each model adds to the one before,

@@ -102,13 +102,14 @@ def as_often_as_commands(case: Case) -> Case:
     """Return a case with every k-th sample of a channel that has k or more to a command.
 
     A response to a command shows at the command's rate; more samples add only noise at several times the
-    cost.
+    cost. A filter at the samples needs all of them.
     """
     drive = case.drive
     if not isinstance(drive, Drive):
         return case
     period = drive.hold * drive.step
-    every = {n: slice(None, None, _samples_in(period, t)) for n, t in case.t.items()}
+    whole = {n for n, known in case.filters.items() if known.is_sampled}
+    every = {n: slice(None, None, 1 if n in whole else _samples_in(period, t)) for n, t in case.t.items()}
     thinner = replace(drive, at={n: at[every[n]] for n, at in drive.at.items()})
     return case.keep(every, thinner)
 

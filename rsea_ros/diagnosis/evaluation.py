@@ -158,11 +158,7 @@ def held_out_data(selection: Selection, record: Checked | None) -> HeldOut:
 
 
 def evaluate(
-    selection: Selection,
-    chosen: Candidate,
-    held_out: HeldOut,
-    pools: Pools,
-    settings: DiagnosisSettings,
+    selection: Selection, chosen: Candidate, held_out: HeldOut, pools: Pools, settings: DiagnosisSettings
 ) -> Evaluated:
     """Re-fit a model to the training and validation blocks, and score it on the held-out data."""
     cases, blocks = selection.cases, (*TRAIN, *VALIDATION)

@@ -152,12 +152,9 @@ class Score:
 
 
 def score_on(
-    problem: Problem,
-    cases: Sequence[Case],
-    blocks: tuple[int, ...],
-    outputs: list[dict[str, FloatArray]],
+    problem: Problem, cases: Sequence[Case], blocks: tuple[int, ...], outputs: list[dict[str, FloatArray]],
     rule: BlockSettings,
-) -> Score:
+) -> Score:  # fmt: skip
     """Return the score of simulated outputs on some sets of the blocks of `cases`."""
     return score(problem, tuple(part(c, blocks, rule) for c in cases), outputs, rule)
 

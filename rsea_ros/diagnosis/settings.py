@@ -327,9 +327,7 @@ class NextRunSettings:
         0.5, "1", "RMS of what a rival cannot follow, over the noise, that separates it",
         "the 3360 samples of 12 s at 280 Hz then lie 10 standard deviations above noise",
     )  # fmt: skip
-    series_duration: float = number(
-        60.0, "s", "of a run at another amplitude", "as long as a usual record"
-    )
+    series_duration: float = number(60.0, "s", "of a run at another amplitude", "as long as a usual record")
     series_top: float = number(
         60.0, "Hz", "upper end of its band", "above it the driver's limit of the slew leaves little amplitude"
     )

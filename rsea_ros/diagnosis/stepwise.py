@@ -189,13 +189,9 @@ def _others(screened: Sequence[ScreenedEffect], chosen: Sequence[ScreenedEffect]
 
 
 def select_stepwise(
-    nominal: Problem,
-    effects: Sequence[Effect],
-    pools: Pools,
-    tell: Progress,
-    settings: DiagnosisSettings,
+    nominal: Problem, effects: Sequence[Effect], pools: Pools, tell: Progress, settings: DiagnosisSettings,
     start: Rig | None = None,
-) -> Selection:
+) -> Selection:  # fmt: skip
     """Select up to max_causes causes among some effects, the one that explains most first.
 
     start: a rig whose values the first fit begins with.

@@ -113,8 +113,9 @@ def omitted_parts(rig: Rig, why: str) -> dict[str, str]:
 def omitted_sensors(rig: Rig, noise: str) -> dict[str, str]:
     """Return what the rig states of its sensors, which no target reads as they do. noise: why not theirs."""
     late = {f"sensors.{n}.delay": s.delay for n, s in rig.sensors.items() if s.delay}
-    delays = {name: f"{1e3 * delay:g} ms; read the output so much later" for name, delay in late.items()}
-    return {"sensor noise": noise, **delays} if rig.sensors else {}
+    left = {name: f"{1e3 * delay:g} ms; read the output so much later" for name, delay in late.items()}
+    left |= {f"sensors.{n}.filter": f"{f.kind}; pass the output through it" for n, f in rig.filters().items()}
+    return {"sensor noise": noise, **left} if rig.sensors else {}
 
 
 _LONGEST = 60

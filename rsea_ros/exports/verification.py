@@ -3,7 +3,7 @@
 import math
 import tempfile
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as xml
@@ -42,11 +42,12 @@ class Difference:
 
 
 def ours(rig: Rig, command: FloatArray) -> dict[str, FloatArray]:
-    """Return the measurements of our simulation of a rig at the beginning of each command's hold.
+    """Return what perfect sensors read of our simulation of a rig at the beginning of each command's hold.
 
     command: N m, or target rad of a rig with a position loop, at RATE.
     """
     t = np.arange(len(command)) / RATE
+    rig = replace(rig, sensors={n: replace(s, delay=0.0, filter=None) for n, s in rig.sensors.items()})
     driven = "command" if rig.loop is None else "reference"
     names = [name for name in CHANNELS if rig.measures(name)]
     asked = {name: Channel(t, np.zeros(len(t))) for name in names}

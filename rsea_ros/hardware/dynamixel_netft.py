@@ -169,6 +169,7 @@ class DynamixelNetft:
             values |= {f"encoder_{kind}": n for kind, n in self._encoder.errors.items()}
         if self._sensor is not None:
             values |= {f"ft_{kind}": n for kind, n in self._sensor.counts().items()}
+            values["ft_low_pass"] = self._sensor.low_pass or "not stated"
             values["ft_noise_nm"] = f"{self._sensor.noise[5]:.3g}"
         if self._last is not None:
             values |= {"temperature_c": self._last.temperature, "voltage_v": f"{self._last.voltage:.1f}"}

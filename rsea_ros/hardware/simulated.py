@@ -11,7 +11,7 @@ from rsea_ros.hardware.device import State
 from rsea_ros.hardware.protection import PROCESS, Protection
 from rsea_ros.model.drive import steps_per_sample
 from rsea_ros.model.rig import Rig
-from rsea_ros.model.simulation import build, measure, run
+from rsea_ros.model.simulation import Filters, build, measure, run
 from rsea_ros.model.step import OUTPUTS
 from rsea_ros.records.record import FloatArray
 
@@ -30,21 +30,14 @@ class SimulatedDevice:
     protection = Protection(PROCESS)
 
     def __init__(
-        self,
-        rig: Rig,
-        rate: float,
-        *,
-        seed: int = 0,
-        noise: bool = True,
-        duration: float = 60.0,
+        self, rig: Rig, rate: float, *, seed: int = 0, noise: bool = True, duration: float = 60.0,
         clock: Callable[[], int] | None = None,
-    ) -> None:
+    ) -> None:  # fmt: skip
         self._rig, self._noise, self._clock = rig, noise, clock or _steady_clock()
         self._rng = np.random.default_rng(seed)
-        self._per_second = rate * steps_per_sample(1.0 / rate)
+        self._period, self._per_second = 1.0 / rate, rate * steps_per_sample(1.0 / rate)
         self._duration = duration
-        self._machine = build(rig, 1.0 / self._per_second, duration)
-        self._values = np.zeros(len(OUTPUTS))
+        self._build()
         self._start: int | None = None
         self._steps, self._torque = 0, 0.0
         self._writes: list[tuple[int, float]] = []
@@ -53,10 +46,14 @@ class SimulatedDevice:
     def open(self) -> None:
         """Start at rest, now, also after a `close`."""
         if self._steps:
-            self._machine = build(self._rig, 1.0 / self._per_second, self._duration)
-            self._values = np.zeros(len(OUTPUTS))
+            self._build()
         self._steps, self._torque, self._writes = 0, 0.0, []
         self._start = self._clock()
+
+    def _build(self) -> None:
+        step = 1.0 / self._per_second
+        self._machine, self._values = build(self._rig, step, self._duration), np.zeros(len(OUTPUTS))
+        self._filters = Filters(self._rig, step, self._period, held=not self._machine.lags)
 
     def read(self) -> State:
         """Advance to now and measure."""
@@ -117,6 +114,7 @@ class SimulatedDevice:
         held = self._held_torque(begin, count)
         out = np.empty((count, len(OUTPUTS)))
         run(self._machine, held, out, start=first / self._per_second)
+        self._filters.apply(out)
         self._steps, self._values = first + count, out[-1]
 
     def _held_torque(self, begin: int, count: int) -> FloatArray:
@@ -136,7 +134,7 @@ class SimulatedDevice:
         return held
 
     def _measure(self, channel: str, value: FloatArray) -> float:
-        return float(measure(self._rig, channel, value, self._rng) if self._noise else value)
+        return float(measure(self._rig, channel, value, self._rng, self._filters) if self._noise else value)
 
 
 def _steady_clock() -> Callable[[], int]:

@@ -45,7 +45,7 @@ from rsea_ros.identification.result import FrequencyResponse
 from rsea_ros.model.equations import Mechanics
 from rsea_ros.model.position_loop import close_loop
 from rsea_ros.model.propagator import encoder_row, read_row, state_space
-from rsea_ros.model.rig import Rig
+from rsea_ros.model.rig import Rig, Sensor
 from rsea_ros.records.record import ComplexArray, FloatArray, IntArray, Record
 from rsea_ros.records.statistics import hann, next_fast_length, runs_of
 
@@ -338,6 +338,7 @@ def _smooth(values: FloatArray) -> FloatArray:
     return smooth
 
 
+UNFILTERED = Sensor()
 HIGHEST = 0.45
 """Of the sample rate: above it an image is as large as the response itself."""
 
@@ -350,14 +351,19 @@ def sampled_lines(aligned: lpm.Aligned) -> lpm.Lines:
     return welch(aligned) if suits(aligned) else lpm.local_polynomial(aligned)
 
 
-def estimate_response(record: Record, output: str) -> FrequencyResponse:
-    """Return output per command.
+def estimate_response(record: Record, output: str, sensor: Sensor = UNFILTERED) -> FrequencyResponse:
+    """Return output per command, as it is before the delay and the filter that its sensor is known to have.
 
     Raises ChannelError for a missing channel and IdentificationError for one too short.
     """
     aligned = lpm.align(record, output)
     lines = sampled_lines(aligned).up_to(HIGHEST * min(1.0 / aligned.period, aligned.rate))
-    response, sd = unfold(aligned, lines.frequency, lines.response, lines.sd)
+    known, period = sensor.filter, 1.0 / aligned.rate
+    passed, sampled = sensor.response(lines.frequency, period), np.ones(len(lines.frequency), complex)
+    if known is not None and known.is_sampled:  # then the images have passed it as the wanted response has
+        sampled = known.response(lines.frequency, period)
+    response, sd = unfold(aligned, lines.frequency, lines.response / sampled, lines.sd / np.abs(sampled))
+    response, sd = response * sampled / passed, sd * np.abs(sampled / passed)
     return FrequencyResponse(
         input="command", output=output, frequency=lines.frequency, response=response,
         coherence=lines.coherence, sd=sd, method=lines.method, noise=lines.noise,
@@ -376,7 +382,7 @@ def responses_of(record: Record, rig: Rig) -> tuple[FrequencyResponse, ...]:
     responses = []
     for name in (n for n in outputs if len(record[n]) >= FEWEST and not record[n].is_still):
         with suppress(lpm.AtRestError):
-            responses.append(estimate_response(record, name))
+            responses.append(estimate_response(record, name, rig.sensors.get(name, UNFILTERED)))
     return tuple(r for r in responses if len(r.frequency) > 0)
 
 

@@ -145,11 +145,7 @@ def identify(
     confidence = with_even_clocks(doubt, solution, records, steady.records)
     result = _result(solution, outputs, records, cases, responses, others, confidence)
     report("done", 1.0)
-    return replace(
-        result,
-        remarks=(*steady.remarks, *result.remarks),
-        clocks=required.remarks,
-    )
+    return replace(result, remarks=(*steady.remarks, *result.remarks), clocks=required.remarks)
 
 
 def _misfits(solution: Solution, cases: Sequence[Case]) -> bool:
@@ -159,14 +155,10 @@ def _misfits(solution: Solution, cases: Sequence[Case]) -> bool:
 
 
 def _result(
-    solution: Solution,
-    outputs: Sequence[dict[str, FloatArray]],
-    records: Sequence[Record],
-    cases: Sequence[Case],
-    responses: tuple[FrequencyResponse, ...],
-    others: Sequence[ExtendedFit],
+    solution: Solution, outputs: Sequence[dict[str, FloatArray]], records: Sequence[Record],
+    cases: Sequence[Case], responses: tuple[FrequencyResponse, ...], others: Sequence[ExtendedFit],
     confidence: Confidence,
-) -> Identification:
+) -> Identification:  # fmt: skip
     """Gather the result. cases: with their noise, before any weight followed a misfit."""
     problem = solution.problem
     errors = errors_by_channel(problem, outputs)

@@ -33,7 +33,7 @@ from rsea_ros.effects.signal_table import Port
 from rsea_ros.identification.problem import Case
 from rsea_ros.model.drive import Drive
 from rsea_ros.model.rig import Rig
-from rsea_ros.model.simulation import Machine, build, run, sample
+from rsea_ros.model.simulation import NOTHING_WITHIN, Machine, build, over_span, sample
 from rsea_ros.model.step import OUTPUTS, Calls
 from rsea_ros.records.record import FloatArray
 
@@ -96,7 +96,10 @@ class Injector:
         out = (self._run(torque * (size / largest), place) - self.base) * (largest / size)
         at = {n: (t - drive.start) / drive.step for n, t in self.sampled.items()}
         smooth = np.zeros(len(drive.command))
-        return {n: sample(n, out[:, OUTPUTS.index(n)], at[n], smooth) for n in at}
+        read = {n: sample(n, out[:, OUTPUTS.index(n)], at[n], smooth) for n in at}
+        for n in (n for n, known in self.rig.filters().items() if n in read and known.is_sampled):
+            read[n] = self.rig.filters()[n].over(read[n], float(np.median(np.diff(self.sampled[n]))))
+        return read
 
     def raw(self, torque: FloatArray, place: Place) -> FloatArray:
         """Return the response of all OUTPUTS to a torque (N m) at the ends of the steps, the start first."""
@@ -117,15 +120,8 @@ class Injector:
             moves = {True: 5.0, False: 6.0}[rig.end_is_free("housing_end")]
             kind = moves if place == "load" else float(PORTS[place])
             machine = with_injection(machine, torque, PORTS[place], kind)
-        machine.begin(drive.initial)
-        out = np.empty((len(drive.command) + 1, len(OUTPUTS)))
-        out[0] = machine.table[[st.POSITION, st.VELOCITY, st.COMMAND, st.FT, st.SPRING_ANGLE]]
-        command, reference = drive.command, drive.reference
-        if rig.loop is not None:
-            command, reference = np.zeros(len(drive.command)), drive.command
-        run(machine, command, out[1:], reference=reference)
-        out[0, 2] = out[1, 2]
-        return out
+        drive = replace(drive, origin=0.0, restarts=(), spring=None)
+        return over_span(machine, rig, drive, np.empty(0), NOTHING_WITHIN, 0, len(drive.command))
 
 
 def with_injection(machine: Machine, torque: FloatArray, port: Port, kind: float) -> Machine:
@@ -192,7 +188,9 @@ def _pulse_answers(injector: Injector, period: float, count: int, place: Place) 
     pulse[:hold] = 1.0
     out = quiet.raw(pulse, place)
     at = np.minimum(np.rint(period * np.arange(count) / drive.step).astype(np.int64), steps)
-    return {n: out[at, k] for k, n in enumerate(OUTPUTS)}
+    answers = {n: out[at, k] for k, n in enumerate(OUTPUTS)}
+    known = {n: f for n, f in injector.rig.filters().items() if f.is_sampled}
+    return answers | {n: f.over(answers[n], period) for n, f in known.items()}
 
 
 def _at_sensor(place: Place, period: float, count: int) -> dict[str, FloatArray]:

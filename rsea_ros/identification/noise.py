@@ -133,11 +133,11 @@ def least_noise(values: FloatArray, sensor: Sensor, rule: NoiseSettings = NOISE)
     """Return the least noise of a channel: no model has to fit better.
 
     Half the rig's quantum, or where the values come in steps larger than that, q / sqrt(12) of those; and a
-    tenth of the noise that the rig states: a smaller one comes from a filter.
+    tenth of the noise that the rig states: a smaller one comes from a filter that it does not state.
     """
     step = step_of(values)
     coarse = step / math.sqrt(12.0) if step > sensor.quantum else 0.0
-    stated = max(0.5 * sensor.quantum, rule.filtered * sensor.noise)
+    stated = max(0.5 * sensor.quantum, 0.0 if sensor.filter else rule.filtered * sensor.noise)
     return max(stated, coarse, _ROUNDING * float(np.std(values)), _TINY)
 
 

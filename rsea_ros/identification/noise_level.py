@@ -81,12 +81,9 @@ _SHARED_BANDS = (0.4, 4.0, 14.0, 50.0)
 
 
 def is_noise(
-    case: Case,
-    outputs: Mapping[str, FloatArray],
-    channel: str,
-    ratio: float = 1.0,
+    case: Case, outputs: Mapping[str, FloatArray], channel: str, ratio: float = 1.0,
     rule: NoiseSettings = NOISE,
-) -> bool:
+) -> bool:  # fmt: skip
     """Return whether the residual of a channel is noise of its sensor, coloured or not.
 
     outputs: of the fitted model, by channel. ratio: of the gear, rotor over output.
@@ -99,7 +96,7 @@ def is_noise(
     rate = 1.0 / float(np.median(np.diff(case.t[channel])))
     if _lasting_share(residual) > rule.lasting or _slow(residual, rate) > rule.slow:
         return False
-    spectra = unit_spectra(residual, _LONG, 8)
+    spectra = _as_made(case, channel, unit_spectra(residual, _LONG, 8))
     shape = shape_of(spectra)
     if shape.off > rule.shape or _unsteady(spectra, shape, rate) > rule.unsteady:
         return False
@@ -113,6 +110,20 @@ def is_noise(
 def residual_of(case: Case, outputs: Mapping[str, FloatArray], channel: str) -> FloatArray:
     """Return measured - simulated, 0 where a sample does not count, shape of the channel."""
     return np.where(case.mask[channel], case.measured[channel] - outputs[channel], 0.0)
+
+
+def _as_made(case: Case, channel: str, spectra: ComplexArray) -> ComplexArray:
+    """Return spectra of a residual as they were before the known filter of its sensor colours noise."""
+    if channel not in case.filters:
+        return spectra
+    known = case.filters[channel].coefficients(float(np.median(np.diff(case.t[channel]))), held=True)
+    b, a = (np.abs(np.fft.rfft(part, 2 * spectra.shape[1] - 2)) ** 2 for part in known)
+    passed = np.convolve(np.pad(b / a, 1, mode="reflect"), _HANN_LINES, mode="valid")
+    return np.asarray(spectra / np.sqrt(np.maximum(passed, 1e-12)))
+
+
+_HANN_LINES = np.array([1.0, 4.0, 1.0]) / 6.0
+"""Shares of the power of a line, and of its neighbours, behind a Hann window."""
 
 
 def _lasting_share(values: FloatArray) -> float:

@@ -18,6 +18,7 @@ from rsea_ros.model.extent import SKIPPED_START
 from rsea_ros.model.inverse import CUT_OFF, Motion, acting_torque, is_inverse, motion_from, torques_along
 from rsea_ros.model.position_loop import with_command
 from rsea_ros.model.rig import Rig, Sensor
+from rsea_ros.model.sensor_filter import SensorFilter
 from rsea_ros.model.simulation import drive_of, simulate_drives
 from rsea_ros.model.step import OUTPUTS
 from rsea_ros.records.record import BoolArray, Channel, FloatArray, Record
@@ -34,6 +35,7 @@ class Case:
     least: by channel its least noise. coloured: channels whose entire residual was
     taken for noise of the sensor after a fit (noise_level.py). start_shows: what the state at the start does
     to the residual, orthonormal, shape (m, k), where that state is not known; the residual is without it.
+    filters: known ones, by channel.
     """
 
     drive: Drive | Motion
@@ -46,6 +48,7 @@ class Case:
     least: Mapping[str, float] = field(default_factory=dict)
     coloured: frozenset[str] = frozenset()
     start_shows: FloatArray | None = None
+    filters: Mapping[str, SensorFilter] = field(default_factory=dict)
 
     def within(self, mask: Mapping[str, BoolArray]) -> Case:
         """Return the case with only samples that are also in `mask`."""
@@ -102,9 +105,7 @@ def case_from(
     good = {n: ~masked[n] if masked and n in masked else np.ones(len(record[n]), bool) for n in channels}
     start = float(record["command"].t[0]) + SKIPPED_START
     known = {n: outside_gaps(record, record[n].t, SKIPPED_START) for n in channels}
-    counts = {
-        n: good[n] & known[n] & np.isfinite(record[n].y) & (record[n].t >= start) for n in channels
-    }
+    counts = {n: good[n] & known[n] & np.isfinite(record[n].y) & (record[n].t >= start) for n in channels}
     heard = record.with_channels(**{n: _counted_span(record[n], counts[n]) for n in channels})
     return Case(
         drive=drive_of(record, rig),
@@ -114,6 +115,7 @@ def case_from(
         mask=MappingProxyType(counts),
         source=record.source,
         floating=floating,
+        filters=rig.filters(),
         least=MappingProxyType({n: least_noise(heard[n].y, sensors[n], rule) for n in channels}),
     )
 

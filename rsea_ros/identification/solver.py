@@ -217,15 +217,10 @@ class Descent:
 
 
 def descend(
-    residual: Callable[[FloatArray], FloatArray],
-    slope: Callable[[FloatArray, FloatArray], FloatArray],
-    theta: FloatArray,
-    information: FloatArray,
-    *,
-    rounds: int = 15,
-    enough: float = 1e-3,
+    residual: Callable[[FloatArray], FloatArray], slope: Callable[[FloatArray, FloatArray], FloatArray],
+    theta: FloatArray, information: FloatArray, *, rounds: int = 15, enough: float = 1e-3,
     parts: Sequence[float] = (1.0, 0.5, 0.25, 0.1, 0.03),
-) -> Descent:
+) -> Descent:  # fmt: skip
     """Minimise a residual beside a prior by Gauss-Newton, every step cut until it helps.
 
     slope: derivatives (m, n) at theta and its residual. information: of the prior, (n, n), about the start.
@@ -252,14 +247,9 @@ def descend(
 
 
 def _along_the_bend(
-    problem: Problem,
-    theta: FloatArray,
-    residual: FloatArray,
-    trial: FloatArray,
-    along: FloatArray,
-    matrix: FloatArray,
-    normal: FloatArray,
-) -> FloatArray:
+    problem: Problem, theta: FloatArray, residual: FloatArray, trial: FloatArray, along: FloatArray,
+    matrix: FloatArray, normal: FloatArray,
+) -> FloatArray:  # fmt: skip
     """Return the end of a step from theta moved to where the valley bends, or `trial` where that is too far.
 
     along: change of the residual by the derivatives.

@@ -185,9 +185,7 @@ def _effect_unknown(effect: Effect, p: Parameter, start: float) -> Unknown:
         return Unknown(name, start, p.unit, p.low, p.high, False, p.spread, scale, inverse=True)
     scale = 1.0 if p.logarithmic else abs(p.typical) or 1.0
     difference = JUMPING if p.jumps else SMOOTH
-    return Unknown(
-        name, start, p.unit, p.low, p.high, p.logarithmic, p.spread, scale, difference=difference
-    )
+    return Unknown(name, start, p.unit, p.low, p.high, p.logarithmic, p.spread, scale, difference=difference)
 
 
 def idle(effect: Effect, rig: Rig) -> frozenset[str]:

@@ -283,14 +283,9 @@ def steps_per_sample(period: float, longest: float = LONGEST_STEP) -> int:
 
 
 def drive_from(
-    record: Record,
-    *,
-    refine: int = 1,
-    closed_loop: bool = False,
-    from_rest: bool = False,
-    targeted: bool = False,
-    hold: Hold = "zero",
-) -> Drive:
+    record: Record, *, refine: int = 1, closed_loop: bool = False, from_rest: bool = False,
+    targeted: bool = False, hold: Hold = "zero",
+) -> Drive:  # fmt: skip
     """Lay a record's command on the step grid. Raises IdentificationError for a record too short.
 
     refine divides the step further. closed_loop: a controller makes the command from the reference; what

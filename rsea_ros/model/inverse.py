@@ -26,7 +26,7 @@ from rsea_ros.errors import IdentificationError
 from rsea_ros.model.drive import gaps
 from rsea_ros.model.equations import Mechanics, mechanics, with_structure
 from rsea_ros.model.extent import SKIPPED_START, check_extent, check_slow
-from rsea_ros.model.rig import END_NAMES, Rig
+from rsea_ros.model.rig import END_NAMES, Rig, check_unfiltered
 from rsea_ros.model.simulation import Machine, build
 from rsea_ros.model.step import Calls, call_port
 from rsea_ros.records.holds import AT_EDGE
@@ -224,6 +224,8 @@ def inverse_torque(rig: Rig, motion: Motion) -> FloatArray:
 
 def torques_along(rig: Rig, motion: Motion) -> dict[str, FloatArray]:
     """Return the torques of `motion.judged` that a motion takes, N m, filtered like the motion."""
+    read = ("position", "motor_torque", *(("ft", "deflection") if rig.motion == "measured" else ()))
+    check_unfiltered(rig, read, "a rig that is judged along its measured motion")
     rig_as_is = with_structure(rig)
     if rig.motion == "measured":
         rig_as_is = replace(rig_as_is, clamped=frozenset(END_NAMES))

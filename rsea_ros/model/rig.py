@@ -7,17 +7,20 @@ FIELDS is the only list of the values that a rig may have, by the dotted names o
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import PurePath
 from types import MappingProxyType
 from typing import Literal
 
+import numpy as np
+
 from rsea_ros.documents.units import plain, with_unit
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.errors import RigError
+from rsea_ros.model.sensor_filter import SensorFilter
 from rsea_ros.model.train import PARTS, TRAINS, Part, Train
-from rsea_ros.records.record import FloatArray
+from rsea_ros.records.record import ComplexArray, FloatArray
 
 LEAST_SIZE, GREATEST_SIZE = 1e-12, 1e12
 """Limits of the size of a nonzero value; beyond them the equations have no accurate digit."""
@@ -136,6 +139,10 @@ class Quantity:
 _UNSTATED = Quantity(0.0)
 
 
+_SLOWLY = 1e-3
+"""Hz, against every filter."""
+
+
 @dataclass(frozen=True)
 class Sensor:
     """Noise (one sigma) and quantum of a channel, in the channel's unit (see signals.UNITS).
@@ -143,7 +150,8 @@ class Sensor:
     zero_unknown: the zero differs from record to record (an encoder that counts from power-on), so only
     changes of its values count. clock: s, delay of the reading after its stamp at the start of a record;
     clock_rate: ppm, growth of that delay with time. clock_doubt: s, one sigma of `clock`, which a fit
-    estimates. delay: s, known, by which the reading is older than that: a filter's or a bus's.
+    estimates. delay: s, known, by which the reading is older than that, as by a bus. filter: known; what it
+    logs has passed it, noise too, and then has steps of its quantum.
     """
 
     noise: float = 0.0
@@ -153,11 +161,21 @@ class Sensor:
     clock_doubt: float = CLOCK_DOUBT
     clock_rate: float = 0.0
     delay: float = 0.0
+    filter: SensorFilter | None = None
 
     @property
     def level(self) -> float:
         """The RMS of noise and rounding together: the error of a rounded value is even over a quantum."""
         return math.hypot(self.noise, self.quantum / math.sqrt(12.0))
+
+    def response(self, hz: FloatArray, period: float) -> ComplexArray:
+        """Return its delay and filter at frequencies, Hz, shape (n,). period: of its samples, s."""
+        late: ComplexArray = np.exp(-2j * np.pi * self.delay * hz)
+        return late if self.filter is None else late * self.filter.response(hz, period)
+
+    def lag(self, period: float) -> float:
+        """Return by how much a slow reading is late by delay and filter, s. period: of its samples, s."""
+        return float(-np.angle(self.response(np.array([_SLOWLY]), period))[0] / (2.0 * math.pi * _SLOWLY))
 
 
 @dataclass(frozen=True)
@@ -359,6 +377,10 @@ class Rig:
         sensor = self.sensors.get(channel)
         return sensor is None or sensor.clock == sensor.clock_rate == sensor.delay == 0.0
 
+    def filters(self) -> dict[str, SensorFilter]:
+        """Return the known filters of its sensors by channel."""
+        return {name: sensor.filter for name, sensor in self.sensors.items() if sensor.filter is not None}
+
     def clock_doubt(self, channel: str) -> float:
         """Return one sigma of the error of a channel's clock beside `clock`, s."""
         return self.sensors[channel].clock_doubt if channel in self.sensors else CLOCK_DOUBT
@@ -403,6 +425,12 @@ def check_two_torques(rig: Rig) -> None:
     """Raise RigError for a rig without a spring: it has one torque, not one on either side."""
     if rig.rigid_spring:
         raise RigError(f"rig {rig.name}: spring.rigid = True, expected a spring with a torque on either side")
+
+
+def check_unfiltered(rig: Rig, channels: Collection[str], what: str) -> None:
+    """Raise RigError where a channel has a known filter that something (what) cannot serve."""
+    for at in (f"sensors.{n}.filter" for n in rig.filters() if n in channels):
+        raise RigError(f"rig {rig.name}: {at}, expected none for {what}", at)
 
 
 def _check_trains(rig: Rig) -> None:

@@ -25,7 +25,7 @@ from rsea_ros.documents.strict_yaml import (
     text,
     unit,
 )
-from rsea_ros.documents.units import plain
+from rsea_ros.documents.units import plain, with_unit
 from rsea_ros.documents.wording import did_you_mean, quote
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.errors import FieldError, RigError, RseaError
@@ -45,6 +45,7 @@ from rsea_ros.model.rig import (
     check_value,
     loop_names,
 )
+from rsea_ros.model.sensor_filter import KINDS, SensorFilter
 from rsea_ros.model.train import PARTS, TRAINS
 from rsea_ros.records.record import MEASURED, UNITS
 
@@ -68,11 +69,7 @@ _MEANINGS = {
     "housing.inertia": "inertia of the housing, if a proximal spring holds it",
     "proximal_spring.stiffness": "stiffness between the housing and its end",
     "proximal_spring.damping": "damping of that spring",
-    **{
-        f"{end}.{key}": meaning
-        for end in END_NAMES
-        for key, meaning in _END.items()
-    },
+    **{f"{end}.{key}": meaning for end in END_NAMES for key, meaning in _END.items()},
     "spring_end.above_sensor": "share of its inertia between the spring and the F/T sensor",
 }  # fmt: skip
 _TRAINS = ", ".join(f"`{train}`" for train in TRAINS)
@@ -96,14 +93,9 @@ TOP = (
     Key("motion", "`simulated` or `measured`", "`simulated`", "measured: something else moves the output"),
     Key("linear", "true or false", "false", "m, N, kg replace rad, N·m, kg·m²"),
     Key("known", "list of names such as `gear.ratio`", "none", "values that no fit may change"),
-    Key("sensors", "mapping, a key for each channel", "perfect sensors", "noise, steps, clocks"),
+    Key("sensors", "mapping, a key for each channel", "perfect sensors", "noise, steps, clocks, filters"),
     Key("controller", "mapping", "none", "position loop that was active during the record, see below"),
-    Key(
-        "hold",
-        "`zero`, `first` or `band`",
-        "`zero`",
-        "between commands: the last one, a line, a band-limited curve",
-    ),
+    Key("hold", "`zero`, `first`, `band`", "`zero`", "between commands: held, a line, band-limited"),
     Key("effects", "list", "none", "active effects of the catalogue"),
     Key("conditions", "list", "none", "what differs in single records"),
     *(Key(group, "mapping", NEEDED if group == "rotor" else "defaults", "see below") for group in GROUPS),
@@ -124,7 +116,13 @@ SENSOR = (
     Key("clock", "{value: …, unit: s}, below 0.01 s", "0 s", "delay of the reading after its stamp"),
     Key("clock_rate", "{value: …, unit: ppm}, below 1000 ppm", "0 ppm", "growth of that delay with time"),
     Key("delay", "{value: …, unit: s}, from 0, below 0.2 s", "0 s", "age of the reading at its stamp, known"),
+    Key("filter", "mapping, see below", "none", "filter that the reading has passed, known"),
 )
+FILTER = [Key("kind", ", ".join(f"`{kind}`" for kind in KINDS), NEEDED, "kind of the filter")]
+FILTER += [
+    Key(key, f"{{value: …, unit: {unit_name}}}, {low:g} to {high:g}", f"`{kind}`: required", meaning)
+    for kind, numbers in KINDS.items() for key, (unit_name, low, high, meaning) in numbers.items()
+]  # fmt: skip
 CLOCK = (
     Key("value", "number", NEEDED),
     Key("unit", "s", NEEDED),
@@ -175,7 +173,7 @@ def tables() -> str:
     parts.append(table("sensors.CHANNEL", SENSOR))
     channels = ", ".join(f"`{n}` {plain(u)}" for n, u in UNITS.items())
     parts.append(f"Channels and their units: {channels}.\n")
-    parts += [table("sensors.CHANNEL.clock", CLOCK)]
+    parts += [table("sensors.CHANNEL.clock", CLOCK), table("sensors.CHANNEL.filter", FILTER)]
     parts += [_loop_table(kind) for kind in LOOP_FIELDS]
     parts += [table("controller", CONTROLLER), table("effects[i]", EFFECT)]
     parts += [table("conditions[i]", CONDITION), table("GROUP.FIELD", QUANTITY)]
@@ -218,62 +216,66 @@ def sensors_from(body: Mapping[str, Any]) -> dict[str, Sensor]:
     only_keys(body, set(MEASURED), "sensors")
     sensors = {}
     for name, item in body.items():
-        fields = mapping(item, f"sensors.{name}")
-        only_keys(fields, names(SENSOR), f"sensors.{name}")
-        unit(fields.get("unit"), f"sensors.{name}.unit", UNITS[name])
-        noise, quantum = (
-            number(fields.get(k, 0.0), f"sensors.{name}.{k}", UNITS[name]) for k in ("noise", "quantum")
-        )
+        at = f"sensors.{name}"
+        fields = mapping(item, at)
+        only_keys(fields, names(SENSOR), at)
+        unit(fields.get("unit"), f"{at}.unit", UNITS[name])
+        noise, quantum = (number(fields.get(k, 0.0), f"{at}.{k}", UNITS[name]) for k in ("noise", "quantum"))
         if not (0 <= noise < math.inf and 0 <= quantum < math.inf):
-            raise RigError(
-                f"sensors.{name} = {noise:g}, {quantum:g} {plain(UNITS[name])}, expected finite values >= 0",
-                f"sensors.{name}",
-            )
-        floating, clock = switch(fields, f"sensors.{name}.zero_unknown"), _clock(fields, name)
-        late = _clock_rate(fields, name), _delay(fields, name)
-        sensors[name] = Sensor(noise, quantum, floating, *clock, *late)
+            stated = f"{noise:g}, {quantum:g} {plain(UNITS[name])}"
+            raise RigError(f"{at} = {stated}, expected finite values >= 0", at)
+        floating, clock = switch(fields, f"{at}.zero_unknown"), _clock(fields, f"{at}.clock")
+        rate = _stated(fields, f"{at}.clock_rate", "ppm", _FASTEST)
+        delay = _stated(fields, f"{at}.delay", "s", _OLDEST)
+        if delay < 0.0:
+            expected = "expected 0 or more: a reading is no younger"
+            raise RigError(f"{at}.delay.value = {delay:g} s, {expected}", f"{at}.delay")
+        sensors[name] = Sensor(noise, quantum, floating, *clock, rate, delay, _filter(fields, f"{at}.filter"))
     return sensors
 
 
-def _clock(fields: Mapping[str, Any], name: str) -> tuple[float, float]:
+def _clock(fields: Mapping[str, Any], field: str) -> tuple[float, float]:
     """Return value and doubt, s, from `clock: {value: …, unit: s, doubt: …}`; 0 where there is none."""
-    field = f"sensors.{name}.clock"
-    item = mapping(fields.get("clock", {"value": 0.0, "unit": "s"}), field)
-    only_keys(item, names(CLOCK), field)
-    value = _small(item, field, "s", _LATEST)
-    doubt = number(item.get("doubt", CLOCK_DOUBT), f"{field}.doubt", "s")
+    value = _stated(fields, field, "s", _LATEST, CLOCK)
+    doubt = number(fields.get("clock", {}).get("doubt", CLOCK_DOUBT), f"{field}.doubt", "s")
     if not 0.0 < doubt < _LATEST:
         raise RigError(f"{field}.doubt = {doubt:g} s, expected more than 0, less than {_LATEST:g} s", field)
     return value, doubt
 
 
-def _clock_rate(fields: Mapping[str, Any], name: str) -> float:
-    """Return ppm from `clock_rate: {value: …, unit: ppm}`; 0 where there is none."""
-    field = f"sensors.{name}.clock_rate"
-    item = mapping(fields.get("clock_rate", {"value": 0.0, "unit": "ppm"}), field)
-    only_keys(item, names(CLOCK_RATE), field)
-    return _small(item, field, "ppm", _FASTEST)
-
-
-def _delay(fields: Mapping[str, Any], name: str) -> float:
-    """Return s from `delay: {value: …, unit: s}`; 0 where there is none."""
-    field = f"sensors.{name}.delay"
-    item = mapping(fields.get("delay", {"value": 0.0, "unit": "s"}), field)
-    only_keys(item, names(CLOCK_RATE), field)
-    value = _small(item, field, "s", _OLDEST)
-    if value < 0.0:
-        raise RigError(f"{field}.value = {value:g} s, expected 0 or more: a reading is no younger", field)
-    return value
-
-
-def _small(item: Mapping[str, Any], field: str, unit_name: str, limit: float) -> float:
-    """Return the value of `{value: …, unit: …}`. Raises RigError where it is not within the limit."""
-    unit(item.get("unit"), f"{field}.unit", unit_name)
-    value = number(item.get("value"), f"{field}.value", unit_name)
+def _stated(
+    fields: Mapping[str, Any], field: str, unit_name: str, limit: float, keys: Sequence[Key] = CLOCK_RATE
+) -> float:
+    """Return the value of `{value: …, unit: …}`; 0 where there is none. Raises RigError beyond a limit."""
+    item = fields.get(field.split(".")[-1], {"value": 0.0, "unit": unit_name})
+    value = _value(item, field, unit_name, keys)
     if not abs(value) < limit:
         expected = f"expected less than {limit:g} {unit_name} either way"
         raise RigError(f"{field}.value = {value:g} {unit_name}, {expected}", field)
     return value
+
+
+def _value(item: Any, field: str, unit_name: str, keys: Sequence[Key] = CLOCK_RATE) -> float:
+    body = mapping(item, field, expected=f"{{value: …, unit: {unit_name}}}")
+    only_keys(body, names(keys), field)
+    unit(body.get("unit"), f"{field}.unit", unit_name)
+    return number(body.get("value"), f"{field}.value", unit_name)
+
+
+def _filter(fields: Mapping[str, Any], field: str) -> SensorFilter | None:
+    """Return the filter of a sensor from `filter: {kind: …, …}`."""
+    if "filter" not in fields:
+        return None
+    item, numbers = mapping(fields["filter"], field), []
+    if (kind := text(item.get("kind", ""), f"{field}.kind")) not in KINDS:
+        raise RigError(f"{field}.kind = {quote(kind)}, expected one of {', '.join(KINDS)}", f"{field}.kind")
+    only_keys(item, {"kind", *KINDS[kind]}, field)
+    for key, (unit_name, low, high, meaning) in KINDS[kind].items():
+        numbers.append(_value(item.get(key), f"{field}.{key}", unit_name))
+        if not low <= numbers[-1] <= high or (key == "samples" and numbers[-1] % 1.0):
+            expected = f"expected {with_unit(f'{low:g} to {high:g}', unit_name)}: {meaning}"
+            raise RigError(f"{field}.{key} = {numbers[-1]:g}, {expected}", f"{field}.{key}")
+    return SensorFilter(kind, tuple(numbers))
 
 
 def check_effects(settings: Sequence[EffectSetting]) -> None:

@@ -15,6 +15,7 @@ from rsea_ros.documents.wording import did_you_mean, quote
 from rsea_ros.errors import OutputError, RigError
 from rsea_ros.model.rig import CLOCK_DOUBT, FIELDS, Condition, Quantity, Rig, Sensor
 from rsea_ros.model.rig_document import rig_from_document, with_conditions
+from rsea_ros.model.sensor_filter import KINDS
 from rsea_ros.records.record import UNITS
 
 
@@ -81,6 +82,10 @@ def _sensor_to_document(name: str, sensor: Sensor) -> dict[str, Any]:
     if sensor.clock_doubt != CLOCK_DOUBT:
         body["clock"]["doubt"] = sensor.clock_doubt
     body |= {"delay": {"value": sensor.delay, "unit": "s"}} if sensor.delay else {}
+    if known := sensor.filter:
+        stated = zip(KINDS[known.kind].items(), known.numbers, strict=True)
+        numbers = {key: {"value": value, "unit": unit} for (key, (unit, *_)), value in stated}
+        body["filter"] = {"kind": known.kind, **numbers}
     return body | ({"clock_rate": {"value": sensor.clock_rate, "unit": "ppm"}} if sensor.clock_rate else {})
 
 

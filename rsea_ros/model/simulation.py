@@ -24,6 +24,7 @@ from rsea_ros.model.extent import LARGEST, SMALLEST
 from rsea_ros.model.position_loop import STATES, control, loop_parameters, with_command
 from rsea_ros.model.propagator import OUTPUT_ROWS, propagator, start_map
 from rsea_ros.model.rig import END_NAMES, Rig
+from rsea_ros.model.sensor_filter import Running
 from rsea_ros.model.step import OUTPUTS, Calls, Linear, StepInputs, StepState, advance
 from rsea_ros.records.record import Channel, FloatArray, Record
 
@@ -220,23 +221,30 @@ def _drive_outputs(
     spans = drive.simulated
     edges = [0.5 * (end + first) for (_, end), (first, _) in itertools.pairwise(spans)]
     is_mixed = machine.lags or machine.early < 0.5 or drive.mixes
+    filters = rig.filters()
     for part, (first, end) in enumerate(spans):
         held = drive.command[first:end] if drive.jumps else np.zeros(end - first)
         within = np.zeros((end - first, 4)) if is_mixed else NOTHING_WITHIN
         if len(within):
             within[:, 0] = held
             held = within[:, 0]
-        out = _over_span(machine, rig, drive, ridden, within, first, end)
+        out = over_span(machine, rig, drive, ridden, within, first, end)
         if on_angle:
             steady = _without_noise(drive, out[1:, 0], first, end) * rig["gear.ratio"]
-            out = _over_span(machine, rig, drive, steady, within, first, end)
+            out = over_span(machine, rig, drive, steady, within, first, end)
+        begins = [0, *(k - first for k, _ in drive.restarts if first < k < end)]
         for at, sampled in zip(wanted, results, strict=True):
             for n, k in channels.items():
                 inside = np.searchsorted(edges, at[n]) == part if edges else slice(None)
                 since = at[n][inside] - first
-                read = sample(n, out[:, k], since, held, within, early=machine.early, lags=machine.lags)
-                if len(within) and (kick := _kick(machine, n)) != 0.0:
+                known = filters.get(n)
+                name = n if known is None or known.is_sampled else ""  # what has passed before does not jump
+                read = sample(name, out[:, k], since, held, within, early=machine.early, lags=machine.lags)
+                if len(within) and name and (kick := _kick(machine, n)) != 0.0:
                     read += kick * drive.step * _beside_mean(within, since)
+                if name and known is not None and len(read) > 1:
+                    period = drive.step * float(np.median(np.diff(at[n])))
+                    read = known.over(read, period, [0, *np.searchsorted(since, begins[1:])])
                 sampled[n][inside] = read
     return results
 
@@ -251,7 +259,7 @@ def _without_noise(drive: Drive, simulated: FloatArray, first: int, end: int) ->
     return _middles(angle)
 
 
-def _over_span(
+def over_span(
     machine: Machine, rig: Rig, drive: Drive, ridden: FloatArray, within: FloatArray, first: int, end: int
 ) -> FloatArray:
     """Return OUTPUTS at the ends of the steps of a span, those at its beginning first. within: StepInputs."""
@@ -271,9 +279,22 @@ def _over_span(
             torque[k:stop], reference[k:stop], ridden[k:stop], drive.origin + k * drive.step,
             drive.jumps, within[start : stop - first],
         )  # fmt: skip
-        advance(machine.linear, machine.calls, inputs, state, out[start + 1 : stop - first + 1])
-        out[start, 2] = out[start + 1, 2]
+        part = out[start : stop - first + 1]
+        advance(machine.linear, machine.calls, inputs, state, part[1:])
+        part[0, 2] = part[1, 2]
+        _pass_filters(machine, rig, part, inputs.within)
     return out
+
+
+def _pass_filters(machine: Machine, rig: Rig, out: FloatArray, within: FloatArray) -> None:
+    """Let OUTPUTS at the ends of steps, those at the beginning first, pass the filters in continuous time."""
+    for n in (n for n, known in rig.filters().items() if not known.is_sampled):
+        values, held = out[:, OUTPUTS.index(n)], n == "motor_torque" and not machine.lags
+        if held and len(within):  # the current's mean over the step
+            mixed = np.flatnonzero(within[:, 1] != within[:, 2])
+            share = within[mixed, 2] / (within[mixed, 2] - within[mixed, 1])
+            values[1 + mixed] += share * (within[mixed, 3] - values[1 + mixed])
+        values[:] = rig.filters()[n].over(values, machine.table[st.STEP], held=held)
 
 
 def _instants(rig: Rig, drive: Drive, channel: str, at: FloatArray) -> FloatArray:
@@ -413,7 +434,8 @@ def synthesize(rig: Rig, command: Channel, *, seed: int = 0, noise: bool = True)
     rng = sensor_noise(seed)
     true = simulate(rig, blank_record)
     _check_bounded(rig, true)
-    measured = {n: Channel(stamps, measure(rig, n, true[n], rng) if noise else true[n]) for n in names}
+    chain = Filters(rig, period, period)
+    measured = {n: Channel(stamps, measure(rig, n, true[n], rng, chain) if noise else true[n]) for n in names}
     return blank_record.with_channels(**measured)
 
 
@@ -434,12 +456,45 @@ def sensor_noise(seed: int) -> np.random.Generator:
     return np.random.default_rng([seed, _SENSORS])
 
 
-def measure(rig: Rig, channel: str, value: FloatArray, rng: np.random.Generator) -> FloatArray:
-    """Return the readings of the rig's sensor for true values: noise added, rounded to its quantum."""
+class Filters:
+    """The filters of a rig's sensors, with what they remember, for a bench that is read sample by sample.
+
+    step: of the simulation, period: between readings, s. held: the current is, within a step.
+    """
+
+    def __init__(self, rig: Rig, step: float, period: float, *, held: bool = True) -> None:
+        self._true, self._noise = [], {}
+        for n, known in rig.filters().items():
+            self._noise[n] = Running(known.coefficients(period, held=True))
+            of_step = known.coefficients(step, held=held and n == "motor_torque")
+            rows, true = slice(None), Running(of_step, first=0.0)
+            if known.is_sampled:
+                rows, true = slice(-1, None), Running(known.coefficients(period))
+            self._true.append((rows, OUTPUTS.index(n), true))
+
+    def apply(self, out: FloatArray) -> None:
+        """Replace OUTPUTS at the ends of steps, a row each, the last of them a sample, by what has passed."""
+        for rows, k, running in self._true:
+            out[rows, k] = running(out[rows, k])
+
+    def noise(self, channel: str, noise: FloatArray) -> FloatArray:
+        """Return what passes of the noise of a channel's samples, of its shape."""
+        running = self._noise.get(channel)
+        return noise if running is None else running(np.atleast_1d(noise)).reshape(np.shape(noise))
+
+
+def measure(
+    rig: Rig, channel: str, value: FloatArray, rng: np.random.Generator, filters: Filters | None = None
+) -> FloatArray:
+    """Return the readings of the rig's sensor for true values: noise added, rounded to its quantum.
+
+    filters: for a sensor with a filter, which the values have passed already.
+    """
     sensor = rig.sensors.get(channel)
     if sensor is None:
         return value
-    noisy = value + sensor.noise * rng.standard_normal(np.shape(value))
+    noise = sensor.noise * rng.standard_normal(np.shape(value))
+    noisy = value + (noise if filters is None else filters.noise(channel, noise))
     return np.round(noisy / sensor.quantum) * sensor.quantum if sensor.quantum > SMALLEST else noisy
 
 
@@ -463,6 +518,7 @@ class Plant:
         self._seen = [k for k, name in enumerate(OUTPUTS) if noise and name in rig.sensors]
         sensors = [rig.sensors[OUTPUTS[k]] for k in self._seen]
         self._noises, quanta = np.array([s.noise for s in sensors]), np.array([s.quantum for s in sensors])
+        self._filtered = [i for i, s in enumerate(sensors) if s.filter]
         self._rounds = quanta > SMALLEST
         self._quanta = np.where(self._rounds, quanta, 1.0)
         self._count = steps_per_sample(1.0 / rate)
@@ -474,15 +530,21 @@ class Plant:
     def reset(self) -> None:
         """Go back to rest, at time zero."""
         self._machine = build(self._rig, self._step, 60.0)
+        period, held = self._count * self._step, not self._machine.lags
+        self._filters = Filters(self._rig, self._step, period, held=held)
         self._time = 0.0
 
     def step(self, command: float) -> PlantSample:
         """Hold a command (N m) for one sample period and return the measurement at its end."""
         run(self._machine, np.full(self._count, command), self._out, start=self._time)
         self._time += self._count * self._step
+        self._filters.apply(self._out)
         values = self._out[-1]
         if self._seen:  # as `measure`, of all channels at once: a study takes 50 000 samples
-            noisy = values[self._seen] + self._noises * self._rng.standard_normal(len(self._seen))
+            noise = self._noises * self._rng.standard_normal(len(self._seen))
+            for i in self._filtered:
+                noise[i] = self._filters.noise(OUTPUTS[self._seen[i]], noise[i])
+            noisy = values[self._seen] + noise
             values[self._seen] = np.where(self._rounds, np.round(noisy / self._quanta) * self._quanta, noisy)
         position, velocity, torque, ft, deflection = values.tolist()
         return PlantSample(position, velocity, torque, math.nan if self._rig.rigid_spring else ft, deflection)

@@ -102,7 +102,7 @@ def witnesses_of(values: Values, rating: Rating = UNRATED) -> Witnesses | None:
         bent=math.hypot(0.2, stiffness), driven=0.3, risen=max(0.3, inertia), dragged=max(0.5, damping),
         play=0.02 * torque + spring.stiffness * stated.get("gap", 0.0),
         friction=0.1 * torque + stated.get("torque", 0.0) + stated.get("coulomb_torque", 0.0),
-        creep=2e-3, late=0.01 + max((sensor.delay for sensor in rig.sensors.values()), default=0.0),
+        creep=2e-3, late=0.01 + max((s.lag(1.0 / values["rate"]) for s in rig.sensors.values()), default=0.0),
     )  # fmt: skip
     return Witnesses(spring, actuator, 1.0 / values["rate"])
 

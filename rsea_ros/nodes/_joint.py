@@ -68,9 +68,12 @@ class DrivenJoint:
         values = self._values
         self.guarded.open(unprotected=values["allow_no_dead_host_protection"])
         self._ended = ""
-        self._health.hardware = _hardware(values, self.guarded.device.health())
-        limits = self.guarded.guard.limits
+        health, limits = self.guarded.device.health(), self.guarded.guard.limits
+        self._health.hardware = _hardware(values, health)
         self._node.get_logger().info(self.with_name(f"limits: {limits}"))
+        if (number := health.get("ft_low_pass", "0")) != "0":
+            text = f"F/T sensor: low pass (setuserfilter) {number}; the rig states it as sensors.ft.filter"
+            self._node.get_logger().info(self.with_name(text))
         self.topics = BenchTopics(
             self._node, {**values, "torque_limit": limits.torque}, strict=True,
             every_record=values["ft_all"], part=self.part, deflects=self.guarded.measures_deflection(),

@@ -104,9 +104,7 @@ def readings(rig: Rig) -> dict[str, Rig]:
 def resonance_hz(rig: Rig) -> float:
     """Return where the torque at the spring end is largest above 3 Hz, Hz."""
     hz = _HZ[_HZ >= 3.0]
-    return _sharpen(
-        hz, int(np.argmax(_decibel(rig, hz))), lambda f: -float(_decibel(rig, np.array([f]))[0])
-    )
+    return _sharpen(hz, int(np.argmax(_decibel(rig, hz))), lambda f: -float(_decibel(rig, np.array([f]))[0]))
 
 
 def largest_gap(rig: Rig, other: Rig) -> tuple[float, float]:

@@ -112,7 +112,7 @@ def test_a_moved_rig_comes_back_from_its_file_and_says_what_it_needs():
     assert rig_from_document(rig_to_document(joint())).motion == "measured"
     with pytest.raises(RigError, match="motion = measured with a position loop, expected simulated"):
         replace(load_rig("pd_joint"), motion="measured")
-    with pytest.raises(RigError, match="motion = 'felt', expected simulated or measured"):
+    with pytest.raises(RigError, match="motion = 'felt', expected one of simulated, measured"):
         replace(joint(), motion="felt")
     bare = Record({n: moved()[n] for n in ("command", "position")}, source="walk")
     with pytest.raises(IdentificationError, match="no deflection or ft channel, expected one"):

@@ -56,6 +56,15 @@ def test_a_sensor_that_answers_gives_its_calibration():
 
 
 @pytest.mark.parametrize(
+    ("stated", "known"), [("8", "8"), ("0", "0"), ("", ""), ("&lt;b&gt;", ""), ("-1", ""), ("9" * 4, "")]
+)
+def test_the_number_of_its_low_pass_is_read(stated, known):
+    page = GOOD.replace(b"</netft>", f"<setuserfilter>{stated}</setuserfilter></netft>".encode())
+    assert calibration.parse(page).low_pass == known
+    assert calibration.parse(GOOD).low_pass == ""
+
+
+@pytest.mark.parametrize(
     ("field", "about_z"),
     [
         (b"<cfgmr>700;700;1700;30000;30000;30000</cfgmr>", 30.0),

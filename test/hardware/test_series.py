@@ -163,6 +163,7 @@ def test_each_series_makes_the_torque_and_says_what_it_is(benches, model):
     loop.close()
     assert loop.guarded.fault is None
     assert made == pytest.approx(1.0, abs=0.05 + table.ampere * table.torque_constant.value)
+    assert health["ft_low_pass"] == "0"
     assert health["motor"] == table.name and str(table.torque_constant.low) in str(health["torque_constant"])
     assert bench.torque() == (0, False)
 

@@ -23,7 +23,8 @@ def case(y, rate=RATE):
     """A case of one channel, measured beside an output of zero, with a motion of which it shows nothing."""
     t = np.arange(len(y)) / rate
     drive = SimpleNamespace(t=t, torque=np.sin(3.0 * t), q=np.cos(5.0 * t), v=np.sin(7.0 * t))
-    return SimpleNamespace(t={"ft": t}, mask={"ft": np.ones(len(y), bool)}, measured={"ft": y}, drive=drive)
+    all_count = {"ft": np.ones(len(y), bool)}
+    return SimpleNamespace(t={"ft": t}, mask=all_count, measured={"ft": y}, drive=drive, filters={})
 
 
 def passes(y, **more):

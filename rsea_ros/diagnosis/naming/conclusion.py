@@ -46,12 +46,9 @@ from rsea_ros.records.statistics import Z95
 
 
 def cause_of(
-    step: tuple[Evaluated, Evaluated],
-    last: Evaluated,
-    channel: str,
-    named: Named,
+    step: tuple[Evaluated, Evaluated], last: Evaluated, channel: str, named: Named,
     settings: DiagnosisSettings,
-) -> Cause:
+) -> Cause:  # fmt: skip
     """Return an accepted cause: its parameters beside all causes, its gain on the test blocks.
 
     step: the models without and with it. last: the model with all causes. channel: preferred for its gain
@@ -207,12 +204,9 @@ class Outcome:
 
 
 def outcome_of(
-    places: Sequence[CauseAndRivals],
-    selection: Selection,
-    stages: Sequence[Evaluated],
-    examined: Examined,
+    places: Sequence[CauseAndRivals], selection: Selection, stages: Sequence[Evaluated], examined: Examined,
     settings: DiagnosisSettings,
-) -> Outcome:
+) -> Outcome:  # fmt: skip
     """Return the verdict on weighed causes, those that are named, and those that may not be."""
     levels = settings.floor
     channel = next((n for n in MEASURED if n in stages[0].test.sums), None)
@@ -307,12 +301,9 @@ def main_channel(test: Score, channel: str, reached: float = DEFAULT.floor.reach
 
 
 def conclude(
-    selection: Selection,
-    stages: Sequence[Evaluated],
-    examined: Examined,
-    pools: Pools,
+    selection: Selection, stages: Sequence[Evaluated], examined: Examined, pools: Pools,
     settings: DiagnosisSettings,
-) -> Diagnosis:
+) -> Diagnosis:  # fmt: skip
     """Weigh and name the causes of a selection. stages: its models, evaluated."""
     places = weigh(selection, stages, held_out_data(selection, examined.holdout), pools, settings)
     outcome = outcome_of(places, selection, stages, examined, settings)

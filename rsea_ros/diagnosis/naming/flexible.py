@@ -221,12 +221,9 @@ def _hat(signal: FloatArray, side: float, knots: FloatArray, k: int) -> FloatArr
 
 
 def _with_part(
-    problem: Problem,
-    theta: FloatArray,
-    base: Sequence[dict[str, FloatArray]],
-    effect: Effect,
+    problem: Problem, theta: FloatArray, base: Sequence[dict[str, FloatArray]], effect: Effect,
     parts: Sequence[FloatArray],
-) -> list[dict[str, FloatArray]]:
+) -> list[dict[str, FloatArray]]:  # fmt: skip
     """Return the channels with one part of the spline acting where the effect does."""
     if effect.port is st.Port.SENSOR:
         seen = effect.sensor

@@ -74,11 +74,9 @@ def _log_odds(weight: float, surest: float) -> float:
 
 
 def probability(
-    e: Evidence,
-    preferred: bool,
-    coefficients: Mapping[str, float] = COEFFICIENTS,
+    e: Evidence, preferred: bool, coefficients: Mapping[str, float] = COEFFICIENTS,
     settings: DiagnosisSettings = DEFAULT,
-) -> float:
+) -> float:  # fmt: skip
     """Return the probability that the cause is part of the truth under its name, 0 to 1."""
     odds = sum(coefficients[name] * value for name, value in features(e, preferred, settings).items())
     return 1.0 / (1.0 + math.exp(-min(max(odds, -_CERTAIN), _CERTAIN)))
@@ -95,11 +93,9 @@ class Named:
 
 
 def name_causes(
-    places: Sequence[CauseAndRivals],
-    at_floor: bool,
-    needed: Collection[str],
+    places: Sequence[CauseAndRivals], at_floor: bool, needed: Collection[str],
     settings: DiagnosisSettings = DEFAULT,
-) -> list[Named]:
+) -> list[Named]:  # fmt: skip
     """Return the naming of the cause in each place.
 
     at_floor: all causes together leave only noise (criteria.py). needed: the causes for which they do.
@@ -119,13 +115,9 @@ def _name_one(
 
 
 def probabilities_and_status(
-    evidence: Sequence[Evidence],
-    at_floor: bool,
-    settings: DiagnosisSettings = DEFAULT,
-    coefficients: Mapping[str, float] = COEFFICIENTS,
-    *,
-    is_needed: bool = True,
-) -> tuple[list[float], Status | None]:
+    evidence: Sequence[Evidence], at_floor: bool, settings: DiagnosisSettings = DEFAULT,
+    coefficients: Mapping[str, float] = COEFFICIENTS, *, is_needed: bool = True,
+) -> tuple[list[float], Status | None]:  # fmt: skip
     """Return the probability of a cause and of each of its rivals, and the status of the cause.
 
     evidence: of the cause, then of its rivals. At most one of them is right: together they have at most 1.

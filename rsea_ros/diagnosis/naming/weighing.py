@@ -171,9 +171,7 @@ def _stack(
 
 
 def stacking_weights(
-    losses: Sequence[FloatArray],
-    prices: Sequence[float],
-    resamples: int = DEFAULT.acceptance.resamples,
+    losses: Sequence[FloatArray], prices: Sequence[float], resamples: int = DEFAULT.acceptance.resamples
 ) -> FloatArray:
     """Return a weight for each model, shape (k,), summing to 1.
 
@@ -205,12 +203,9 @@ class CauseAndRivals:
 
 
 def weigh(
-    selection: Selection,
-    stages: Sequence[Evaluated],
-    held_out: HeldOut,
-    pools: Pools,
+    selection: Selection, stages: Sequence[Evaluated], held_out: HeldOut, pools: Pools,
     settings: DiagnosisSettings,
-) -> list[CauseAndRivals]:
+) -> list[CauseAndRivals]:  # fmt: skip
     """Return every accepted cause and its rivals with the evidence for each, in the order of the stages."""
     contested = contests(selection, stages, held_out, pools)
     claims = list(itertools.chain.from_iterable(contested))

@@ -89,12 +89,14 @@ class Calibration:
     """The value of a count: N and N m.
 
     rate: records a second that the sensor sends, Hz; nan if not stated. range: of each axis; inf likewise.
+    low_pass: the number of its low pass (`setuserfilter`), 0 for none; empty likewise.
     """
 
     force: float
     torque: float
     rate: float = math.nan
     range: Wrench = (math.inf,) * 6
+    low_pass: str = ""
 
     def wrench(self, counts: tuple[int, ...]) -> Wrench:
         """Return force x, y, z (N) and torque x, y, z (N m) of six counts."""
@@ -112,7 +114,9 @@ def parse(page: bytes, where: str = "netftapi2.xml") -> Calibration:
     units = _unit(fields, "scfgfu", NEWTON, where), _unit(fields, "scfgtu", NEWTON_METRE, where)
     force, torque = units[0] / _counts(fields, "cfgcpf", where), units[1] / _counts(fields, "cfgcpt", where)
     rate = _counts(fields, "comrdtrate", where) if "comrdtrate" in fields else math.nan
-    return Calibration(force, torque, rate, _range(fields.get("cfgmr", ""), *units))
+    low_pass = fields.get("setuserfilter", "")
+    known = low_pass if re.fullmatch(r"[0-9]{1,3}", low_pass) else ""
+    return Calibration(force, torque, rate, _range(fields.get("cfgmr", ""), *units), known)
 
 
 def _range(text: str, newton: float, newton_metre: float) -> Wrench:

@@ -91,13 +91,14 @@ JUMPS = {"restarted": "the sensor was restarted", "frozen": "ft_sequence stands 
 
 
 class ForceTorqueSensor:
-    """One sensor. noise: standard deviation of each axis at rest, N and N m."""
+    """One sensor. noise: standard deviation of each axis at rest, N and N m. low_pass: as its page says."""
 
     def __init__(self, settings: SensorConnection) -> None:
         self._settings = settings
         self._receiver = DatagramReceiver(settings.host, settings.port)
         self._calibration = Calibration(1.0, 1.0)
         self.noise: Wrench = (0.0,) * 6
+        self.low_pass = ""
         self._quiet = 0
         self._stillness = Stillness()
         self._seen: Mapping[str, int] = {}
@@ -105,6 +106,7 @@ class ForceTorqueSensor:
     def open(self) -> None:
         """Get the calibration, start the stream, measure the noise. Raises DeviceError."""
         self._calibration = fetch(self._settings.host, self._settings.page_port)
+        self.low_pass = self._calibration.low_pass
         self._receiver.open()
         try:
             arrivals = self._collect()

@@ -77,7 +77,8 @@ PAGE = f"""<?xml version="1.0"?>
 <netft><prodname>Net F/T</prodname><calsn>FT00000</calsn><cfgnam>bench</cfgnam>
 <cfgcpf>{COUNTS_PER_NEWTON}</cfgcpf><cfgcpt>{COUNTS_PER_NEWTON_MILLIMETRE}</cfgcpt>
 <cfgmr>2800;2800;6800;120000;120000;120000</cfgmr>
-<scfgfu>N</scfgfu><scfgtu>N-mm</scfgtu><comrdtrate>{{rate}}</comrdtrate></netft>
+<scfgfu>N</scfgfu><scfgtu>N-mm</scfgtu><comrdtrate>{{rate}}</comrdtrate>
+<setuserfilter>0</setuserfilter></netft>
 """
 
 

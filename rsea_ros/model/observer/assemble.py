@@ -29,7 +29,7 @@ from rsea_ros.model.observer.filter import (
 )
 from rsea_ros.model.observer.signal_noise import Noise
 from rsea_ros.model.propagator import state_space
-from rsea_ros.model.rig import Rig
+from rsea_ros.model.rig import Rig, check_unfiltered
 from rsea_ros.model.simulation import Machine, build
 from rsea_ros.model.step import Calls
 from rsea_ros.model.transfer import read
@@ -95,6 +95,7 @@ def assemble(
     rig: Rig, noise: Noise, *, hold: float, duration: float, learns: bool
 ) -> tuple[FilterModel, FilterState]:
     """Return the model and the state at rest with nothing known. hold, duration: s; learns: filter.py."""
+    check_unfiltered(rig, ("position", "ft", "motor_torque"), "the observer, which has no state of it")
     machine, linear = build(rig, LONGEST_STEP, duration), linear_model(with_structure(rig))
     n, size = linear.order, len(linear.start)
     measured = np.zeros((2, size))

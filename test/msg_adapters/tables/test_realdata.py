@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.linalg import solve_discrete_are
 from scipy.signal import butter, filtfilt
 
 from msg_adapters.tables import import_record, load_map
@@ -13,6 +15,7 @@ from rsea_ros.identification.start import joint_start
 from rsea_ros.model.position_loop import with_command
 from rsea_ros.model.prediction_errors import predict
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.sensor_filter import SensorFilter
 from rsea_ros.records.record import Record
 
 REPOSITORY = Path(__file__).resolve().parents[3]
@@ -51,6 +54,34 @@ def test_sea_gamma_has_one_spring_behind_two_sensors():
     torque, angle = slow["ft"].y, slow["deflection"].y
     assert np.corrcoef(torque, angle)[0, 1] > 0.9
     assert np.polyfit(angle, torque, 1)[0] == pytest.approx(2155.0, rel=0.25)
+
+
+def test_sea_gamma_behind_its_known_filters_is_predicted_where_it_took_no_part():
+    """Values fitted to the run at 5 N m, held out both at 3: what is left, and twice as much without them.
+
+    The F/T pole is that of the bare motor's steps; the tracker is `init_filter` of the authors' program
+    (filterpy: F of a whole sample, Q_discrete_white_noise of 1 ms and 0.13, R 0.1), by its Riccati equation.
+    """
+    f, dt = np.array([[1.0, 1.0], [0.0, 1.0]]), 1e-3
+    q = 0.13 * np.array([[dt**4 / 4.0, dt**3 / 2.0], [dt**3 / 2.0, dt**2]])
+    p = solve_discrete_are(f.T, np.array([[1.0], [0.0]]), q, np.array([[0.1]]))
+    alpha, beta = (p[:, 0] / (p[0, 0] + 0.1)).tolist()
+    plain, sensors = load_rig("sea_two_encoders"), load_rig("sea_two_encoders").sensors
+    known = {
+        "ft": replace(sensors["ft"], filter=SensorFilter("one_pole", (0.036,)), delay=3e-3),
+        "deflection": replace(
+            sensors["deflection"], filter=SensorFilter("alpha_beta", (alpha, beta)), delay=9.8e-3
+        ),
+    }
+    fitted = {"rotor.reflected_inertia": 0.0220, "rotor.reflected_damping": 0.77, "spring.stiffness": 1780.0}
+    rig = replace(plain, sensors=known).with_values({**fitted, "spring.damping": 0.58})
+    without = {"rotor.reflected_inertia": 0.062, "rotor.reflected_damping": 63.0, "spring.stiffness": 2036.0}
+    left = {}
+    for which, model in (("known", rig), ("without", plain.with_values(without))):
+        runs = [predict(model, _import(f"sea_gamma/open_3_{n}.csv", "sea_gamma")) for n in ("1_25", "2_26")]
+        left[which] = [np.sqrt(np.mean([run[n].rms_error**2 for run in runs])) for n in ("ft", "deflection")]
+    assert left["known"][0] < 0.17 and 2155.4 * left["known"][1] < 0.50
+    assert left["without"][0] > 0.28 and 2155.4 * left["without"][1] > 0.70
 
 
 @pytest.mark.parametrize("joint", range(6))
