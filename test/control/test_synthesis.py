@@ -44,7 +44,7 @@ def test_no_neighbour_that_keeps_the_demands_is_clearly_better(designed):
 
 
 def test_the_designed_controller_meets_its_limits(designed):
-    """At the rate of the nodes. The other trials of `rsea control` follow from these (test/golden: at 140 Hz)."""
+    """At the rate of the nodes. `rsea control` prints more trials of the same kinds (golden: at 140 Hz)."""
     swept = robustness(RIG, LOADS, designed)
     assert swept.cases > 1000 and swept.unstable == 0 and swept.sensitivity < 3.15
     for margins in designed.margins.values():  # |S| <= 2 is 6 dB and 29 degrees

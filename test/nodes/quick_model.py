@@ -1,4 +1,4 @@
-"""The model node with 2 s of patience for a topic that says nothing: what is lost here is repaired in 0.2 s."""
+"""The model node with 2 s of patience for a silent topic: losses are repaired in 0.2 s here."""
 
 from rsea_ros.nodes import _model_inputs, model
 
