@@ -23,7 +23,7 @@ from rsea_ros.records.record import Channel, Record
 
 BENCH = {
     "rig": "paper_high_impedance", "channels": ("ft", "position"), "sensors": "stated", "noise": True,
-    "bench": "as stated", "rate": 280.0, "states": 1.0, "duration": 6.0, "command": "white_noise",
+    "bench": "as stated", "rate": 280.0, "states": 1.0, "duration": 4.5, "command": "white_noise",
     "stamps": "even", "dead": "none", "loop": False, "epoch": 1_700_000_000_000_000_000,
 }  # fmt: skip
 

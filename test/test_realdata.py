@@ -50,11 +50,11 @@ def import_file(file: str, mapping: str) -> Record:
     return import_record(REAL / file, load_map(CONFIG / f"imports/{mapping}.yaml"))
 
 
-def identify_file(file: str, mapping: str, rig: str, folder: Path) -> dict:
+def identify_file(file: str, mapping: str, rig: str, folder: Path, *options: str) -> dict:
     """Import a file, identify the bag, and return identification.json."""
     bag, out = folder / f"{mapping}_bag", folder / f"{mapping}_results"
     assert main(["import", str(REAL / file), "--map", mapping, "--out", str(bag)]) == 0
-    assert main(["identify", str(bag), "--rig", rig, "--out", str(out)]) == 0
+    assert main(["identify", str(bag), "--rig", rig, "--out", str(out), *options]) == 0
     return json.loads((out / "identification.json").read_text(encoding="utf-8"))
 
 
@@ -123,7 +123,7 @@ def ramps(design: str, which: str) -> Statics:
 def test_a_cycloidal_gear_is_identified(tmp_path, capsys):
     design = next(iter(DESIGNS))
     file = f"cycloidal/2024-{design}.csv.gz"
-    short = identify_file(file, "cycloidal_short_ramps", "cycloidal", tmp_path)
+    short = identify_file(file, "cycloidal_short_ramps", "cycloidal", tmp_path, "--to", "12")
     stiffness = short["parameters"]["spring.stiffness"]
     assert 100.0 < stiffness["ci95"][0] < stiffness["ci95"][1] < 900.0
     assert short["parameters"]["coulomb_friction.torque"]["ci95"][0] > 0.0
@@ -131,7 +131,7 @@ def test_a_cycloidal_gear_is_identified(tmp_path, capsys):
     assert least > 0.0 and 0.5 * np.radians(1.95) < most < np.radians(1.95)
     assert any(s.startswith("torque_saturation.limit is not identifiable") for s in short["statements"])
     shown = capsys.readouterr().out
-    assert f"the output angle travels {DESIGNS[design][0]:.2f}°" in shown
+    assert f"the output angle travels {DESIGNS[design][0] - 0.01:.2f}°" in shown  # of three ramps in five
     assert "no saturation" in shown
 
 

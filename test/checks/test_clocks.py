@@ -72,7 +72,7 @@ def test_a_clock_that_the_data_leave_wide_open_gets_no_number(sd, shown):
 
 def test_a_drift_that_turns_the_phases_is_a_fault_with_its_size():
     """Two radians at 60 Hz by the end: no linear fit settles, and the clock was `not determined` in green."""
-    ppm, record = -450.0, record_run(drawn_bench(np.random.default_rng(2)), 2, duration=30.0)
+    ppm, record = -450.0, record_run(drawn_bench(np.random.default_rng(2)), 2, duration=20.0)
     record = late(record, 0.0, 1e-6 * ppm, "ft")
     findings = check_record(record, RIG)
     drift = clock(findings, "clock_drift", "ft")

@@ -5,8 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rsea_ros.control.following import follow
 from rsea_ros.control.law import Gains
 from rsea_ros.control.margins import impedance
+from rsea_ros.control.robustness import robustness
+from rsea_ros.control.study import EFFECTS, lagging_corners, sine, tracking_error
 from rsea_ros.control.synthesis import check, design
 from rsea_ros.control.uncertainty import LOCKED, load_range
 from rsea_ros.errors import ParameterError
@@ -38,6 +41,20 @@ def test_no_neighbour_that_keeps_the_demands_is_clearly_better(designed):
             other = check(RIG, LOADS, RATE, gains)
             short = other.sensitivity > 3.01 or other.impedance > 1.0 + designed.impedance - 0.999
             assert short or worth(other) > worth(designed) - 0.05
+
+
+def test_the_designed_controller_meets_its_limits(designed):
+    """At the rate of the nodes. `rsea control` prints more trials of the same kinds (golden: at 140 Hz)."""
+    swept = robustness(RIG, LOADS, designed)
+    assert swept.cases > 1000 and swept.unstable == 0 and swept.sensitivity < 3.15
+    for margins in designed.margins.values():  # |S| <= 2 is 6 dB and 29 degrees
+        assert margins.sensitivity <= 2.02 and margins.phase >= 28.9 and margins.gain >= 5.95
+    assert sine(RIG, RIG, designed) < 0.02 and follow(RIG, RIG, designed).bandwidth > 19.1
+    rough = RIG.with_effects(EFFECTS[0])
+    assert sine(rough, RIG, designed) < 0.06 and sine(rough, rough, designed) < 0.025
+    for load, most in ((LOCKED, 0.08), ("free x 0.5", 0.05)):
+        errors = [tracking_error(RIG, LOADS, case, designed) for case in lagging_corners(load)]
+        assert max(errors) < most, load
 
 
 def test_gains_of_the_nominal_bench_alone_are_refused_for_the_set():

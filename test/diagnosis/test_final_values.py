@@ -12,7 +12,7 @@ from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.report.diagnosis.page import diagnosis_json
 
-RATE, SECONDS = 280.0, 12.0
+RATE, SECONDS = 280.0, 8.0
 TEMPLATE = Path(__file__).resolve().parents[2] / "config" / "templates" / "rig.yaml"
 
 

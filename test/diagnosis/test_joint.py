@@ -23,7 +23,7 @@ SETTINGS = DiagnosisSettings(max_causes=2, without=tuple(n for n in catalogue() 
 
 def log_joint(rig: Rig, high: float = 3.0) -> Record:
     """Return 8 s of a joint whose inertia, damping and gravity are not those of its rig."""
-    targets = excitation("chirp", replace(JOINT, duration=8.0, high=high))
+    targets = excitation("chirp", replace(JOINT, duration=6.0, high=high))
     off = {"rotor.reflected_inertia": 0.026, "rotor.reflected_damping": 0.35, "spring_end.gravity": 0.6}
     stamps = np.arange(len(targets)) / JOINT.rate
     return synthesize(rig.with_values(off), Channel(stamps, targets), seed=6)

@@ -84,7 +84,7 @@ def test_what_came_later_does_not_decide_between_two_causes_either():
     stated = load_rig("paper_high_impedance")
     rubs = with_effect(stated, "coulomb_friction", {"torque": 2.0})
     truth = with_effect(rubs, "torque_constant_error", {"gain": 0.94})
-    asked = ExcitationSettings(rate=280.0, duration=8.0, amplitude=15.0, noise=0.3, low=0.1, high=60.0)
+    asked = ExcitationSettings(rate=280.0, duration=6.0, amplitude=15.0, noise=0.3, low=0.1, high=60.0)
     command = chirp(asked)
     run = synthesize(truth, Channel(np.arange(len(command)) / 280.0, command), seed=7)
     late = Channel(run["ft"].t + 6e-3, run["ft"].y)

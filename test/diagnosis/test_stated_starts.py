@@ -29,12 +29,12 @@ SETTINGS = DiagnosisSettings(without=frozenset(catalogue()) - TRIED)
 INERTIA = "rotor.reflected_inertia"
 
 
-def torque_chirp_of(values, effects, seed=3):
+def torque_chirp_of(values, effects, seed=3, seconds=7.0):
     """Return a record of a locked actuator with a spring encoder, without motor current."""
     rig = load_rig("sea_two_encoders").with_values(values)
     for name, parameters in effects.items():
         rig = with_effect(rig, name, parameters)
-    asked = ExcitationSettings(rate=RATE, duration=10.0, amplitude=5.0, noise=0.0, low=0.1, high=40.0)
+    asked = ExcitationSettings(rate=RATE, duration=seconds, amplitude=5.0, noise=0.0, low=0.1, high=40.0)
     command = chirp(asked)
     whole = synthesize(rig, Channel(np.arange(len(command)) / RATE, command), seed=seed)
     return replace(whole, channels={n: whole[n] for n in ("command", "ft", "deflection")})
@@ -51,7 +51,7 @@ def test_a_slow_lag_of_the_current_is_named_and_not_what_fits_far_from_the_rig()
 
 def test_two_effects_are_named_where_one_fits_as_well_only_far_from_the_rig():
     effects = {LAG: {"time_constant": 0.02}, DELAY: {"delay": 4e-3}}
-    record = torque_chirp_of({INERTIA: 0.011, "rotor.reflected_damping": 10.0}, effects)
+    record = torque_chirp_of({INERTIA: 0.011, "rotor.reflected_damping": 10.0}, effects, seconds=10.0)
     found = diagnose([record], load_rig("sea_two_encoders"), settings=SETTINGS)
     assert {(c.name, c.status) for c in found.causes} == {(LAG, "confirmed"), (DELAY, "confirmed")}
     sizes = {n: p.value for c in found.causes for n, p in c.parameters.items()}

@@ -155,7 +155,7 @@ def test_a_cause_that_acts_for_four_seconds_of_a_long_record_is_named_and_sized(
     burst = slice(round(81.0 * RATE), round(85.0 * RATE))
     u[burst] *= 6.0
     truth = RIG.with_effects(EffectSetting("torque_saturation", {"limit": 25.0}))
-    tried = ("torque_saturation", "coulomb_friction", "torque_constant_error", "ft_drift")
+    tried = ("torque_saturation", "torque_constant_error")
     settings = replace(SHORT, without=tuple(n for n in catalogue() if n not in tried))
     diagnosis = diagnose([record_of(u, truth)], RIG, settings=settings)
     assert [c.name for c in diagnosis.causes] == ["torque_saturation"]

@@ -69,7 +69,7 @@ def test_a_passive_effect_only_takes_energy(effect: Effect):
 
 @pytest.mark.parametrize(("effect", "rival"), PAIRS, ids=lambda v: v if isinstance(v, str) else v.name)
 def test_a_rival_explains_most_of_what_a_refit_leaves(effect: Effect, rival: str):
-    driven = drive(duration=4.0)
+    driven = drive(duration=2.5)
     measured = simulate(driven, effect.name, effect.typical)
     left, explained = (_misfit(driven, measured, other) for other in (None, catalogue()[rival]))
     assert explained < left / 2

@@ -38,18 +38,18 @@ PLAY = ("backlash", "hard_stop", "ft_sensor_lag", "coulomb_friction")
 NO_DRAG, NO_PLAY = (" ".join(n for n in catalogue() if n not in tried) for tried in (DRAGS, PLAY))
 
 VERBS: dict[str, tuple[str, ...]] = {
-    "bag": (f"simulate {RIG} --effect coulomb_friction:torque=3 --duration 16 --seed 5 --out bag",),
+    "bag": (f"simulate {RIG} --effect coulomb_friction:torque=3 --duration 10 --seed 5 --out bag",),
     "check": ("check bag", "check bag --json"),
     "identified": ("identify bag --out identified",),
     "diagnosed": ("diagnose bag --out diagnosed",),
     "diagnosis_without_friction": (
-        f"diagnose bag --without {NO_DRAG} --max-causes 1 --json --from 2 --to 12",
+        f"diagnose bag --without {NO_DRAG} --max-causes 1 --json --from 1 --to 9",
     ),
     "predicted.csv": ("predict diagnosed/model.yaml bag --out predicted.csv",),
-    "law": ("law bag --out law --from 8",),
+    "law": ("law bag --out law --from 4",),
     "run": ("experiment play.yaml drag.yaml --limits torque=40,deflection=0.1 --longest 4 --out run",),
     "designed": ("design --out designed",),
-    "controlled": (f"control {RIG} --rate 280 --out controlled",),
+    "controlled": (f"control {RIG} --rate 140 --out controlled",),
     "paper": ("paper --duration 20 --out paper",),
     "exported": tuple(
         f"export --{kind} diagnosed/model.yaml --out exported{name}"
@@ -80,7 +80,7 @@ VERBS: dict[str, tuple[str, ...]] = {
         "diagnose bag --holdout bag", "diagnose bag --without dance", "diagnose bag --from 5 --to 3",
         "diagnose bag --max-causes none", "diagnose bag --fail-on dance", "identify bag --topic ft=/nowhere",
         "identify bag --axis torqe.z", "identify bag --shift ft=much", "check bag --joint elbow",
-        "check bag --window 3", "predict map.yaml bag", "predict bag", "law bag --from 15.9",
+        "check bag --window 3", "predict map.yaml bag", "predict bag", "law bag --from 9.9",
         f"simulate {RIG} --effect dance:torque=1 --out x", f"simulate {RIG} --effect backlash:gap=-1 --out x",
         f"simulate {RIG} --effect backlash:gap=wide --out x", f"simulate {RIG} --duration 0 --out x",
         f"simulate {RIG} --rate 1e9 --out x", f"simulate {RIG} --low 200 --out x",
@@ -137,8 +137,8 @@ joints:
     "spoiled.csv": lambda: spoiled(),
     "play.yaml": lambda: rig_text(rsea.load_rig(RIG).with_effect("backlash", gap=0.004)),
     "drag.yaml": lambda: rig_text(rsea.load_rig(RIG).with_effect("coulomb_friction", torque=2.0)),
-    "left": f"simulate {RIG} --duration 8 --seed 2 --out left",
-    "right": f"simulate {RIG} --effect coulomb_friction:torque=3 --duration 8 --seed 5 --out right",
+    "left": f"simulate {RIG} --duration 5 --seed 2 --out left",
+    "right": f"simulate {RIG} --effect coulomb_friction:torque=3 --duration 5 --seed 5 --out right",
 }
 """Files that steps read: their text, or the line that makes them."""
 
@@ -152,16 +152,16 @@ def commands(seconds: float, seed: int) -> np.ndarray:
 
 def spoiled() -> str:
     """Return a table of a bench with play and a late F/T sensor: frozen, missing, wild and lost samples."""
-    u = commands(14.0, 4)
+    u = commands(9.0, 4)
     rig = rsea.load_rig(RIG).with_values({"spring.stiffness": 1500.0})
     rig = rig.with_effect("backlash", gap=0.006).with_effect("ft_sensor_lag", time_constant=0.004)
     record = rsea.simulate(rig, u, 280.0, seed=8)
     t, ft = record["ft"].t.copy(), record["ft"].y.copy()
     ft[500:560] = ft[500]
-    ft[[900, 1700, 2300]] += 400.0
+    ft[[900, 1400, 1700]] += 400.0
     ft[1200:1205] = np.nan
     rows = zip(t, u, np.degrees(record["position"].y), record["velocity"].y, ft, strict=True)
-    lost = {*range(2000, 2030), 3000}
+    lost = {*range(2000, 2030), 2300}
     lines = [",".join(f"{x:.9g}" for x in row) for k, row in enumerate(rows) if k not in lost]
     return "t,u,phi,omega,tau\n" + "\n".join(lines) + "\n"
 

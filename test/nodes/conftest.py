@@ -14,12 +14,16 @@ from rclpy.lifecycle import LifecycleNode
 
 from msg_adapters.ros import Trigger
 from rsea_ros.nodes import driver
+from rsea_ros.nodes._run import PROFILE
 from test.nodes.stalls import every
 from test.nodes.warm import parent
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 TIMEOUT = 60.0
+QUICK = {PROFILE: str(HERE / "quick_repairs.xml")}
+SOCKETS = "driver", "controller"
+"""Nodes that have a profile of their own."""
 AGAIN = 15.0
 """s without an answer, which no service takes."""
 """Seconds for what normally takes one; a cold start compiles the simulation on a busy machine."""
@@ -32,7 +36,8 @@ class Process:
         words = [w for key, value in parameters.items() for w in ("-p", f"{key}:={as_argument(value)}")]
         words += [w for old, new in remaps.items() for w in ("-r", f"{old}:={new}")]
         self._log = log
-        environment = {**os.environ, "PYTHONPATH": str(ROOT), "ROS_LOG_DIR": str(log.parent / "ros")}
+        quick = {} if name in SOCKETS else QUICK
+        environment = {**os.environ, **quick, "PYTHONPATH": str(ROOT), "ROS_LOG_DIR": str(log.parent / "ros")}
         log.touch()
         files = os.devnull, log, log
         module = name if (HERE / f"{name}.py").is_file() else f"rsea_ros.nodes.{name}"
@@ -96,8 +101,10 @@ class Listener:
     """A node in this process; it spins while it waits for something to be true."""
 
     def __init__(self):
-        rclpy.init()
-        self.node = rclpy.create_node("listener")
+        with pytest.MonkeyPatch.context() as patch:  # the first node of a process reads its profile
+            patch.setenv(PROFILE, QUICK[PROFILE])
+            rclpy.init()
+            self.node = rclpy.create_node("listener")
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self.node)
         self.subscriptions, self._clients = [], {}

@@ -46,14 +46,14 @@ def session(bench, start, listener, tmp_path):
     """A function that starts a plant and a node that asks; the plant ends with the test."""
     plants = []  # one of an earlier test would answer for one that was killed
 
-    def begin(program="quick_experiment", **values):
+    def begin(**values):
         for plant in plants:
             plant.kill()
         commands = listener.hear(JointState, "/rsea/torque_command", COMMAND)
         health = listener.hear(DiagnosticArray, "/diagnostics", COMMAND)
         plant, out = start("plant", rig=bench / "bench.yaml"), tmp_path / f"out{len(plants)}"
         node = start(
-            program, rig=RIG, bag=bench / "slow.mcap", out=out,
+            "quick_experiment", rig=RIG, bag=bench / "slow.mcap", out=out,
             causes="current_loop_lag", limits=f"torque={LIMIT}", **values,
         )  # fmt: skip
 
@@ -167,7 +167,7 @@ def test_a_bench_that_dies_in_the_middle_of_a_run_ends_the_session_and_teaches_n
 
 
 def test_a_run_confirms_the_cause(approved):
-    first = approved(lambda asked: False, program="experiment", longest=2.0)
+    first = approved(lambda asked: False, longest=2.0)
     assert first.node.wait() == 0, first.node.output
     assert (first.out / "run-1.mcap").is_file()
     said = told(first.out)

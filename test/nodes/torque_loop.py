@@ -15,7 +15,7 @@ from msg_adapters.ros import (
     torque_command_message,
 )
 from rsea_ros.nodes._cycle import SECOND
-from rsea_ros.nodes._qos import COMMAND, MEASUREMENT
+from rsea_ros.nodes._qos import COMMAND, MEASUREMENT, RECORD_RELIABLE
 from test.nodes.on_wire import newest_status
 from test.nodes.stalls import every
 
@@ -32,13 +32,16 @@ SETTLED = 1.0
 
 
 class Loop:
-    """Topics of plant and controller in a namespace as seen from outside. stalls: faults that it clears."""
+    """Topics of plant and controller in a namespace as seen from outside. stalls: faults that it clears.
+
+    A listener that the machine holds up for a second hears the few pulses of a command none the less.
+    """
 
     def __init__(self, listener, namespace="/rsea", stalls=("commands more than 1 sample late",)):
         self.listener, self._namespace, self._stalls = listener, namespace, stalls
         self.states = listener.hear(JointState, f"{namespace}/joint_states", MEASUREMENT)
         self.wrenches = listener.hear(WrenchStamped, f"{namespace}/ft", MEASUREMENT)
-        self.commands = listener.hear(JointState, f"{namespace}/torque_command", COMMAND)
+        self.commands = listener.hear(JointState, f"{namespace}/torque_command", RECORD_RELIABLE)
         self.health = listener.hear(DiagnosticArray, "/diagnostics", COMMAND)
         self._desired = listener.node.create_publisher(JointState, f"{namespace}/desired_torque", COMMAND)
 
