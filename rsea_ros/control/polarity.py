@@ -181,7 +181,7 @@ class Polarity:
         return 0.0
 
     def _grow(self) -> float:
-        if self._seen.way < BROKEN * self._pulse:
+        if self._seen.way < max(BROKEN * self._pulse, self._seen.unseen):
             self._broke = abs(self._torque)
         before = abs(self._torque)
         self._torque += self._direction * self._pulse * self._h / RISE
