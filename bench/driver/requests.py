@@ -212,7 +212,11 @@ def _wrong_unit(bench: RemoteBench, name: str, value: float, unit: str) -> Row:
     """A limit that was written in another unit."""
     try:
         values: dict[str, Any] = {p.name: p.check(value if p.name == name else p.default) for p in TABLE}
-        Loop(bench, limits_of(values)).device.close()
+        loop = Loop(bench, limits_of(values))
+        try:
+            limits_of(values, loop.device.rating)
+        finally:
+            loop.device.close()
         told = "accepted"
     except ParameterError as error:
         told = f"{error}"
@@ -224,7 +228,9 @@ UNITS = (
     ("torque_limit", 68_000.0, "N·mm"), ("torque_limit", 602.0, "lbf·in"), ("temperature_limit", 158.0, "°F"),
     ("temperature_limit", 343.0, "K"), ("voltage_limit", 200.0, "0.1 V"), ("current_limit", 12_000.0, "mA"),
     ("ft_limit", 110_000.0, "N·mm"), ("deflection_limit", 87.3, "mrad"), ("deflection_limit", 5.0, "°"),
-    ("velocity_limit", 286.0, "°/s"),
+    ("velocity_limit", 286.0, "°/s"), ("effort_limit", 600.0, "N·cm"), ("effort_limit", 53.0, "lbf·in"),
+    ("current_limit", 99.9, "dA"), ("voltage_limit", 2.0, "10 V"), ("voltage_limit", 0.02, "kV"),
+    ("power_limit", 2500.0, "dW"), ("soft_start", 5e5, "N·mm/s"),
 )  # fmt: skip
 TRIALS: dict[str, Trial] = {
     **{

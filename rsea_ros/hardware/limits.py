@@ -4,11 +4,12 @@ import math
 from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol, runtime_checkable
+from typing import NamedTuple, Protocol, runtime_checkable
 
 from rsea_ros.errors import ParameterError
 from rsea_ros.hardware.device import State
 from rsea_ros.hardware.interlock import DeviceFault, Interlock, event
+from rsea_ros.model.rig_limits import POWER, REACH
 from rsea_ros.records.record import NONSENSE, is_measured
 
 COMMAND_TIMEOUT = "command_timeout"
@@ -31,7 +32,8 @@ class Limits:
     effort: N m by which the measured torque may miss the commanded one, for effort_time, s.
     command_timeout: s without a command while torque is commanded. ramp: s from then to zero torque.
     lost_cycles: cycles in a row without an answer, see Losses. ft_axis: place in the wrench.
-    derived: what says so, of each limit that nobody stated (derive).
+    derived: what says so, of each limit that nobody stated (derive). unlikely: stated ones that are a
+    hundredth of what is usual, in words.
     """
 
     torque: float
@@ -52,10 +54,14 @@ class Limits:
     effort_time: float = 0.1
     ft_axis: int = 5
     derived: Mapping[str, str] = field(default_factory=dict)
+    unlikely: str = ""
 
     def __str__(self) -> str:
-        """Return the limits of torque and motion, each derived one with its source."""
-        units = {"torque": "N·m", "velocity": "rad/s", "position": "rad", "deflection": "rad", "ft": "N·m"}
+        """Return the limits of torque, motion and motor, each derived one with its source."""
+        units = {
+            "torque": "N·m", "velocity": "rad/s", "position": "rad", "deflection": "rad", "ft": "N·m",
+            "effort": "N·m", "current": "A", "voltage": "V",
+        }  # fmt: skip
         parts = []
         for name, unit in units.items():
             value = getattr(self, name)
@@ -70,11 +76,15 @@ class Rating:
     """What motor and sensor can do at most; inf: unknown.
 
     torque: N m, of the motor. velocity: rad/s, of the gear output without load. ft: N m, about the axis.
+    current: A, of the motor. lowest, highest: V, of its supply.
     """
 
     torque: float = math.inf
     velocity: float = math.inf
     ft: float = math.inf
+    current: float = math.inf
+    lowest: float = 0.0
+    highest: float = math.inf
 
 
 UNRATED = Rating()
@@ -87,6 +97,46 @@ class Rated(Protocol):
     @property
     def rating(self) -> Rating:
         """Return it."""
+
+
+class Usual(NamedTuple):
+    """A limit that nobody states, where it comes from, and between what a stated one may lie, and why."""
+
+    value: float
+    source: str
+    unit: str
+    least: float
+    most: float
+    why: str
+
+
+def usual_limits(torque: float, motor: float, velocity: float, rating: Rating) -> dict[str, Usual]:
+    """Return those of effort, current, voltage and power; a stated one beyond them is in another unit.
+
+    torque, velocity: their limits. motor: what the motor makes at most, N m.
+    """
+    supply, own = rating.lowest + 0.2 * (rating.highest - rating.lowest), "times the motor's own limit"
+    return {
+        "effort": Usual(*min((6.0, "any motor"), (0.5 * torque, "half of torque_limit")), "N·m",
+                        0.0, 0.5 * motor, "half of what the motor makes"),
+        "current": Usual(*min((12.0, "any motor"), (1.2 * rating.current, f"1.2 {own}")), "A",
+                         0.0, REACH * rating.current, f"{REACH:g} {own}"),
+        "voltage": Usual(*min((20.0, "any motor"), (supply, "a fifth above the motor's lowest")), "V",
+                         rating.lowest / REACH, math.inf, f"the motor's lowest by {REACH:g}"),
+        "power": Usual(POWER, "any motor", "W", 0.0, max(POWER, REACH * motor * velocity),
+                       f"{REACH:g} times what the motor makes at velocity_limit"),
+    }  # fmt: skip
+
+
+def settle(name: str, stated: float | None, usual: Usual) -> float:
+    """Return the limit that counts. Raises ParameterError for a stated one beyond what may be."""
+    if stated is None:
+        return usual.value
+    if math.isfinite(stated) and not usual.least <= stated <= usual.most:
+        bound = f"least {usual.least:.4g}" if stated < usual.least else f"most {usual.most:.4g}"
+        told = f"parameter {name}_limit = {stated:g} {usual.unit}, expected at {bound} {usual.unit}"
+        raise ParameterError(f"{told}, {usual.why}")
+    return stated
 
 
 def unmeasured_quantities(limits: Limits, state: State) -> list[str]:

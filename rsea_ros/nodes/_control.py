@@ -17,6 +17,7 @@ from rsea_ros.control.synthesis import ControllerDesign, DesignLimits, check, de
 from rsea_ros.control.uncertainty import LIGHTEST, lightest, load_range
 from rsea_ros.errors import ParameterError
 from rsea_ros.hardware.device import State
+from rsea_ros.hardware.limits import Usual, settle
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.rig_limits import SLEW, derive
 from rsea_ros.nodes._devices import witnesses_of
@@ -59,7 +60,8 @@ TABLE = (
     NodeParameter("stale", 0.05, "time without a measurement that ends the torque", "s", 0.005, 1.0),
     NodeParameter("release", 0.02, "from there to zero torque", "s", 0.0, 1.0),
     NodeParameter(
-        "error_limit", 15.0, "of the torque against the desired one, for error_time", "N m", 0.1, 1e3
+        "error_limit", DERIVED,
+        "of the torque against the desired one, for error_time; 0: none; -1: derived", "N m", DERIVED, 1e3,
     ),
     NodeParameter("error_time", 0.5, "for which the error may be larger", "s", 0.0, 60.0),
     NodeParameter(
@@ -74,8 +76,12 @@ TABLE = (
 
 def with_limits(values: Values) -> dict[str, Any]:
     """Return the values with the limits that the rig derives, as the driver's. Raises ParameterError."""
-    limits, _ = derive(stated_limits(values, ("torque", "ft")), load_rig(values["rig"]))
-    return {**values, "torque_limit": limits["torque"], "ft_limit": limits["ft"]}
+    stated = stated_limits(values, ("torque", "ft", "error"))
+    limits, _ = derive(stated, load_rig(values["rig"]))
+    torque = limits["torque"]
+    usual = Usual(*min((ERROR, "any motor"), (torque, "")), "N·m", 0.0, max(torque, ERROR), "torque_limit")
+    error = settle("error", stated.get("error"), usual)
+    return {**values, "torque_limit": torque, "ft_limit": limits["ft"], "error_limit": error}
 
 
 def design_of(values: Values) -> ControllerDesign:
@@ -126,6 +132,8 @@ def summary(designed: ControllerDesign) -> list[str]:
     ]
 
 
+ERROR = 15.0
+"""N m of error that no sound bench has for error_time, where torque_limit is no smaller."""
 OBEYED, SEEN = 0.05, 3.0
 """s after which a motor makes the torque that is commanded, N m, of which so much is surely seen."""
 ON_TOPICS = {"axis": "torque.z", "position_zero": "configure", "encoder_id": -1}

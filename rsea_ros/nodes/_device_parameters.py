@@ -86,7 +86,7 @@ LIMITS = (
     ),
     NodeParameter("slew_limit", SLEW, "largest change of torque in a second", "N m/s", 1.0, 1e6),
     NodeParameter(
-        "soft_start", 500.0, "growth of the limit after activation, fault, pause", "N m/s", 1.0, 1e6
+        "soft_start", 500.0, "growth of the limit after activation, fault, pause", "N m/s", 1.0, 1e5
     ),
     NodeParameter("deflection_limit", DERIVED, "of the spring; 0: none; -1: derived", "rad", DERIVED, 100.0),
     NodeParameter(
@@ -100,11 +100,16 @@ LIMITS = (
         "ft_limit", DERIVED, "of the torque that ft measures; 0: none; -1: derived", "N m", DERIVED, 1000.0
     ),
     NodeParameter("power_limit", POWER, "of the motor torque times velocity; 0: none", "W", 0.0, 1e5),
-    NodeParameter("effort_limit", 6.0, "by which measured may miss commanded; 0: none", "N m", 0.0, 1000.0),
+    NodeParameter(
+        "effort_limit", DERIVED, "by which measured may miss commanded; 0: none; -1: derived", "N m",
+        DERIVED, 1000.0,
+    ),
     NodeParameter("effort_time", 0.1, "for which it may", "s", 0.0, 10.0),
     NodeParameter("temperature_limit", 70.0, "of the motor; 0: none", "°C", 0.0, 100.0),
-    NodeParameter("current_limit", 12.0, "of the motor, measured; 0: none", "A", 0.0, 100.0),
-    NodeParameter("voltage_limit", 20.0, "lowest supply voltage; 0: none", "V", 0.0, 100.0),
+    NodeParameter(
+        "current_limit", DERIVED, "of the motor, measured; 0: none; -1: derived", "A", DERIVED, 100.0
+    ),
+    NodeParameter("voltage_limit", DERIVED, "lowest supply; 0: none; -1: derived", "V", DERIVED, 100.0),
     NodeParameter("command_timeout", 0.05, "time without a command that ends the torque", "s", 0.001, 10.0),
     NodeParameter("ramp", 0.02, "from there to zero torque", "s", 0.0, 10.0),
     NodeParameter("lost_cycles", 3, "cycles in a row without an answer that are a fault", "", 1, 100),

@@ -15,7 +15,7 @@ from rsea_ros.hardware.dynamixel.line import Line, LineMotor
 from rsea_ros.hardware.dynamixel.motor import Motor
 from rsea_ros.hardware.dynamixel.port import BAUD_RATES
 from rsea_ros.hardware.dynamixel_netft import DynamixelNetft
-from rsea_ros.hardware.limits import UNRATED, Limits, Rating
+from rsea_ros.hardware.limits import UNRATED, Limits, Rating, settle, usual_limits
 from rsea_ros.hardware.netft.sensor import SensorConnection
 from rsea_ros.hardware.outside import outside_device
 from rsea_ros.hardware.witnesses import Actuator, Witnesses
@@ -26,7 +26,9 @@ from rsea_ros.nodes._parameters import stated_limits
 
 Values = Mapping[str, Any]
 
-DERIVABLE = ("torque", "deflection", "velocity", "ft")
+DERIVABLE = ("torque", "deflection", "velocity", "ft", "effort", "current", "voltage")
+TINY = 0.01
+"""Of the limit that would be derived: a stated one below that is warned of, as one in another unit."""
 
 
 def limits_of(values: Values, rating: Rating = UNRATED) -> Limits:
@@ -45,6 +47,17 @@ def limits_of(values: Values, rating: Rating = UNRATED) -> Limits:
                 f" ({why}), expected 0 for none"
             )
     limits, sources = derive(stated, rig, vars(rating))
+    usual: dict[str, float] = derive({}, rig, vars(rating))[0]
+    motor = max(min(motor_torque(rig)[0], rating.torque), stated.get("torque", 0.0))
+    for name, each in usual_limits(limits["torque"], motor, limits["velocity"], rating).items():
+        value = stated.get(name) if name in DERIVABLE else values[f"{name}_limit"] or math.inf
+        limits[name], usual[name] = settle(name, value, each), each.value
+        if value is None:
+            sources[name] = each.source
+    unlikely = [
+        f"{name}_limit = {value:g}, where {usual[name]:.4g} is usual: is it in another unit?"
+        for name, value in stated.items() if value < TINY * usual[name]
+    ]  # fmt: skip
     for name, why in inapplicable.items():
         limits[name] = math.inf
         if name in sources:
@@ -57,20 +70,21 @@ def limits_of(values: Values, rating: Rating = UNRATED) -> Limits:
         slew=values["slew_limit"],
         deflection=limits["deflection"],
         temperature=values["temperature_limit"] or math.inf,
-        current=values["current_limit"] or math.inf,
-        voltage=values["voltage_limit"],
+        current=limits["current"],
+        voltage=limits["voltage"] if math.isfinite(limits["voltage"]) else 0.0,
         command_timeout=values["command_timeout"],
         ramp=values["ramp"],
         lost_cycles=max(values["lost_cycles"], math.ceil(values["lost_time"] * values["rate"])),
         velocity=limits["velocity"],
         position=values["position_limit"] or math.inf,
         ft=limits["ft"],
-        power=values["power_limit"] or math.inf,
+        power=limits["power"],
         soft_start=values["soft_start"],
-        effort=values["effort_limit"] or math.inf,
+        effort=limits["effort"],
         effort_time=values["effort_time"],
         ft_axis=sign_and_index(values["axis"])[1],
         derived=sources,
+        unlikely="; ".join(unlikely),
     )
 
 

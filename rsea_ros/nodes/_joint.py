@@ -71,6 +71,8 @@ class DrivenJoint:
         self._health.hardware = _hardware(values, self.guarded.device.health())
         limits = self.guarded.guard.limits
         self._node.get_logger().info(self.with_name(f"limits: {limits}"))
+        if limits.unlikely:
+            self._node.get_logger().warning(self.with_name(limits.unlikely))
         self.topics = BenchTopics(
             self._node, {**values, "torque_limit": limits.torque}, strict=True,
             every_record=values["ft_all"], part=self.part, deflects=self.guarded.measures_deflection(),
