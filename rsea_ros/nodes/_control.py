@@ -17,7 +17,7 @@ from rsea_ros.control.synthesis import ControllerDesign, DesignLimits, check, de
 from rsea_ros.control.uncertainty import LIGHTEST, lightest, load_range
 from rsea_ros.errors import ParameterError
 from rsea_ros.hardware.device import State
-from rsea_ros.hardware.limits import Usual, settle
+from rsea_ros.hardware.limits import derive_rest
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.rig_limits import SLEW, derive
 from rsea_ros.nodes._devices import witnesses_of
@@ -78,10 +78,8 @@ def with_limits(values: Values) -> dict[str, Any]:
     """Return the values with the limits that the rig derives, as the driver's. Raises ParameterError."""
     stated = stated_limits(values, ("torque", "ft", "error"))
     limits, _ = derive(stated, load_rig(values["rig"]))
-    torque = limits["torque"]
-    usual = Usual(*min((ERROR, "any motor"), (torque, "")), "N·m", 0.0, max(torque, ERROR), "torque_limit")
-    error = settle("error", stated.get("error"), usual)
-    return {**values, "torque_limit": torque, "ft_limit": limits["ft"], "error_limit": error}
+    limits |= derive_rest(stated, limits["torque"], limits["torque"], limits["velocity"])[0]
+    return {**values, **{f"{name}_limit": limits[name] for name in ("torque", "ft", "error")}}
 
 
 def design_of(values: Values) -> ControllerDesign:
@@ -132,8 +130,6 @@ def summary(designed: ControllerDesign) -> list[str]:
     ]
 
 
-ERROR = 15.0
-"""N m of error that no sound bench has for error_time, where torque_limit is no smaller."""
 OBEYED, SEEN = 0.05, 3.0
 """s after which a motor makes the torque that is commanded, N m, of which so much is surely seen."""
 ON_TOPICS = {"axis": "torque.z", "position_zero": "configure", "encoder_id": -1}

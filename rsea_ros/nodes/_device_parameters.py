@@ -21,46 +21,27 @@ MOTOR = (
     NodeParameter(
         "model", 0, "number that the motor must have (docs/hardware.md); 0: any that is known", "", 0, 65535
     ),
-    NodeParameter(
-        "torque_constant",
-        0.0,
-        "torque at the gear output for a current; 0: that of the model's table",
-        "N m/A",
-        0.0,
-        100.0,
-    ),
-    NodeParameter(
-        "position_zero",
-        "configure",
-        "where angles are zero: where configure finds it, or the motor's own zero",
-        choices=("configure", "motor"),
-    ),
-    NodeParameter(
-        "latency",
-        0.0,
-        "what adapter and host may add to a reply; 0: by the rate, docs/hardware.md",
-        "s",
-        0.0,
-        0.1,
-    ),
-    NodeParameter(
-        "watchdog", 0.1, "time without the driver after which the motor is stopped", "s", 0.02, 2.5
-    ),
+    NodeParameter("torque_constant", 0.0,
+                  "torque at the gear output for a current; 0: that of the model's table",
+                  "N m/A", 0.0, 100.0),
+    NodeParameter("position_zero", "configure", choices=("configure", "motor"),
+                  description="where angles are zero: where configure finds it, or the motor's own zero"),
+    NodeParameter("latency", 0.0,
+                  "what adapter and host may add to a reply; 0: by the rate, docs/hardware.md",
+                  "s", 0.0, 0.1),
+    NodeParameter("watchdog", 0.1,
+                  "time without the driver after which the motor is stopped", "s", 0.02, 2.5),
     NodeParameter("supervisor", "", "socket of a supervisor that runs as a service; empty: a child process"),
-)
+)  # fmt: skip
 ENCODER = (
-    NodeParameter(
-        "encoder_id", -1, "of an encoder on the motor's bus that measures the spring; -1: none", "", -1, 252
-    ),
+    NodeParameter("encoder_id", -1, "of an encoder on the motor's bus that measures the spring; -1: none",
+                  "", -1, 252),
     NodeParameter("encoder_address", 132, "of its angle, 4 bytes, signed", "", 0, 65535),
-    NodeParameter(
-        "encoder_pulses", 4096.0, "counts of a turn; negative: they fall as the angle grows", "", -1e9, 1e9
-    ),
-    NodeParameter(
-        "encoder_place", SPRING,
-        "what it measures: the spring's deflection, or the link relative to the housing",
-        choices=(SPRING, LINK),
-    ),
+    NodeParameter("encoder_pulses", 4096.0, "counts of a turn; negative: they fall as the angle grows",
+                  "", -1e9, 1e9),
+    NodeParameter("encoder_place", SPRING,
+                  "what it measures: the spring's deflection, or the link relative to the housing",
+                  choices=(SPRING, LINK)),
 )  # fmt: skip
 SAFETY = (
     NodeParameter(

@@ -15,7 +15,7 @@ from rsea_ros.hardware.dynamixel.line import Line, LineMotor
 from rsea_ros.hardware.dynamixel.motor import Motor
 from rsea_ros.hardware.dynamixel.port import BAUD_RATES
 from rsea_ros.hardware.dynamixel_netft import DynamixelNetft
-from rsea_ros.hardware.limits import UNRATED, Limits, Rating, settle, usual_limits
+from rsea_ros.hardware.limits import UNRATED, Limits, Rating, derive_rest
 from rsea_ros.hardware.netft.sensor import SensorConnection
 from rsea_ros.hardware.outside import outside_device
 from rsea_ros.hardware.witnesses import Actuator, Witnesses
@@ -26,7 +26,7 @@ from rsea_ros.nodes._parameters import stated_limits
 
 Values = Mapping[str, Any]
 
-DERIVABLE = ("torque", "deflection", "velocity", "ft", "effort", "current", "voltage")
+DERIVABLE = ("torque", "deflection", "velocity", "ft", "effort", "current", "voltage", "power")
 TINY = 0.01
 """Of the limit that would be derived: a stated one below that is warned of, as one in another unit."""
 
@@ -47,13 +47,11 @@ def limits_of(values: Values, rating: Rating = UNRATED) -> Limits:
                 f" ({why}), expected 0 for none"
             )
     limits, sources = derive(stated, rig, vars(rating))
-    usual: dict[str, float] = derive({}, rig, vars(rating))[0]
     motor = max(min(motor_torque(rig)[0], rating.torque), stated.get("torque", 0.0))
-    for name, each in usual_limits(limits["torque"], motor, limits["velocity"], rating).items():
-        value = stated.get(name) if name in DERIVABLE else values[f"{name}_limit"] or math.inf
-        limits[name], usual[name] = settle(name, value, each), each.value
-        if value is None:
-            sources[name] = each.source
+    able = limits["torque"], motor, limits["velocity"], rating
+    more, whence = derive_rest(stated, *able)
+    limits, sources = limits | more, sources | whence
+    usual = derive({}, rig, vars(rating))[0] | derive_rest({}, *able)[0]
     unlikely = [
         f"{name}_limit = {value:g}, where {usual[name]:.4g} is usual: is it in another unit?"
         for name, value in stated.items() if value < TINY * usual[name]
