@@ -61,9 +61,10 @@ class SignChange:
         if not self._clamped or self._before is None or not r.is_whole or since > LOST:
             return 0.0
         before, _ = self._before
-        bent = self._hardest * (r.position - before.position)
-        bent += STIFF * self._damping * (r.velocity - before.velocity)
-        step = _beyond(r.ft - before.ft, bent)
+        late = self._h * (before.velocity * before.ft_age - r.velocity * r.ft_age)  # ft of another instant
+        drag = STIFF * self._damping * (r.velocity - before.velocity)
+        turns = r.position - before.position, r.position - before.position + late
+        step = min((_beyond(r.ft - before.ft, self._hardest * turn + drag) for turn in turns), key=abs)
         usual = JUMPED * since * math.sqrt(self._usual[0])
         return step if abs(step) > max(self._floor, JUMP * self._strongest, usual) else 0.0
 

@@ -208,6 +208,19 @@ def test_a_step_of_ft_that_no_spring_shows_is_followed_by_no_torque(lie, told, h
     assert max(map(abs, sent)) < 1.3 * hold
 
 
+def test_an_ft_of_a_later_instant_is_no_jump():
+    """Where records of ft are lost, a state gets the next one, up to 8 samples later."""
+    plant, polarity, dice = Plant(RIG, RATE), Polarity(RIG, RATE, LIMIT), random.Random(1)
+    torques = [20.0 * math.sin(2.0 * math.pi * 4.0 * k / RATE) for k in range(1400)]
+    readings = [measured(plant.step(torque), {}) for torque in torques]
+    polarity.proven, ahead = True, 0
+    for k in range(1380):
+        ahead = max(ahead - 1, dice.randrange(9) if dice.random() < 0.05 else 0)
+        felt = replace(readings[k], ft=readings[k + ahead].ft, ft_age=-float(ahead))
+        assert not polarity._change.jump(felt, 0), k
+        polarity._change.take(felt, 0.0, 0)
+
+
 def test_a_gain_of_ft_that_changes_is_not_called_a_sign():
     """It was "joint_states has changed its sign"."""
     words, k = falsified_under_torque(RIG, 20.0, {"ft": 0.5})
