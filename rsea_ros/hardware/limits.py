@@ -9,7 +9,6 @@ from typing import Protocol, runtime_checkable
 from rsea_ros.errors import ParameterError
 from rsea_ros.hardware.device import State
 from rsea_ros.hardware.interlock import DeviceFault, Interlock, event
-from rsea_ros.model.rig_limits import POWER, REACH
 from rsea_ros.records.record import NONSENSE, is_measured
 
 COMMAND_TIMEOUT = "command_timeout"
@@ -97,38 +96,6 @@ class Rated(Protocol):
     @property
     def rating(self) -> Rating:
         """Return it."""
-
-
-def derive_rest(
-    stated: Mapping[str, float], torque: float, motor: float, velocity: float, rating: Rating = UNRATED
-) -> tuple[dict[str, float], dict[str, str]]:
-    """Return limits of effort, error, current, voltage and power, and the source of those not stated.
-
-    stated: by name; inf: none. torque, velocity: their limits. motor: what the motor makes at most, N m.
-    Raises ParameterError for one beyond what it ever reaches: it was written in another unit (decision 333).
-    """
-    supply, own = rating.lowest + 0.2 * (rating.highest - rating.lowest), "times the motor's own limit"
-    limits, sources = {}, {}
-    for name, unit, (usual, source), least, most, why in (
-        ("effort", "N·m", min((6.0, "any motor"), (0.5 * torque, "half of torque_limit")),
-         0.0, 0.5 * motor, "half of what the motor makes"),
-        ("error", "N·m", min((15.0, "any motor"), (torque, "torque_limit")),
-         0.0, max(torque, 15.0), "torque_limit"),
-        ("current", "A", min((12.0, "any motor"), (1.2 * rating.current, f"1.2 {own}")),
-         0.0, REACH * rating.current, f"{REACH:g} {own}"),
-        ("voltage", "V", min((20.0, "any motor"), (supply, "a fifth above the motor's lowest")),
-         rating.lowest / REACH, math.inf, f"the motor's lowest by {REACH:g}"),
-        ("power", "W", (POWER, "any motor"), 0.0, max(POWER, REACH * motor * velocity),
-         f"{REACH:g} times what the motor makes at velocity_limit"),
-    ):  # fmt: skip
-        value = limits[name] = stated.get(name, usual)
-        if name not in stated:
-            sources[name] = source
-        elif math.isfinite(value) and not least <= value <= most:
-            bound = f"at least {least:.4g}" if value < least else f"at most {most:.4g}"
-            told = f"parameter {name}_limit = {value:g} {unit}, expected {bound} {unit}, {why}"
-            raise ParameterError(told)
-    return limits, sources
 
 
 def unmeasured_quantities(limits: Limits, state: State) -> list[str]:

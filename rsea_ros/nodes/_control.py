@@ -17,9 +17,8 @@ from rsea_ros.control.synthesis import ControllerDesign, DesignLimits, check, de
 from rsea_ros.control.uncertainty import LIGHTEST, lightest, load_range
 from rsea_ros.errors import ParameterError
 from rsea_ros.hardware.device import State
-from rsea_ros.hardware.limits import derive_rest
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.model.rig_limits import SLEW, derive
+from rsea_ros.model.rig_limits import SLEW, derive, derive_rest
 from rsea_ros.nodes._devices import witnesses_of
 from rsea_ros.nodes._parameters import AXIS, DERIVED, JOINT, NodeParameter, stated_limits
 from rsea_ros.nodes._realtime import REALTIME

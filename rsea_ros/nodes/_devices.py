@@ -15,13 +15,13 @@ from rsea_ros.hardware.dynamixel.line import Line, LineMotor
 from rsea_ros.hardware.dynamixel.motor import Motor
 from rsea_ros.hardware.dynamixel.port import BAUD_RATES
 from rsea_ros.hardware.dynamixel_netft import DynamixelNetft
-from rsea_ros.hardware.limits import UNRATED, Limits, Rating, derive_rest
+from rsea_ros.hardware.limits import UNRATED, Limits, Rating
 from rsea_ros.hardware.netft.sensor import SensorConnection
 from rsea_ros.hardware.outside import outside_device
 from rsea_ros.hardware.witnesses import Actuator, Witnesses
 from rsea_ros.model.rig import END_NAMES, Rig, motor_torque
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.model.rig_limits import derive, felt_through_spring
+from rsea_ros.model.rig_limits import derive, derive_rest, felt_through_spring
 from rsea_ros.nodes._parameters import stated_limits
 
 Values = Mapping[str, Any]
@@ -48,7 +48,7 @@ def limits_of(values: Values, rating: Rating = UNRATED) -> Limits:
             )
     limits, sources = derive(stated, rig, vars(rating))
     motor = max(min(motor_torque(rig)[0], rating.torque), stated.get("torque", 0.0))
-    able = limits["torque"], motor, limits["velocity"], rating
+    able = limits["torque"], motor, limits["velocity"], vars(rating)
     more, whence = derive_rest(stated, *able)
     limits, sources = limits | more, sources | whence
     usual = derive({}, rig, vars(rating))[0] | derive_rest({}, *able)[0]
