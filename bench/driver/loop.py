@@ -22,14 +22,14 @@ RATE, STIFFNESS = 280.0, 1530.456
 class Loop:
     """A device on a bench and its limits, 280 cycles a second; by default those of config/nodes.
 
-    spent: time in each cycle, s.
+    supervisor: socket of its service; empty: a child. spent: time in each cycle, s.
     """
 
-    def __init__(self, bench: RemoteBench, limits: Limits | None = None) -> None:
+    def __init__(self, bench: RemoteBench, limits: Limits | None = None, supervisor: str = "") -> None:
         limits = limits or limits_of({p.name: p.default for p in TABLE})
         self.bench = bench
         self.device = DynamixelNetft(
-            Motor(MotorConnection(bench.port, 4_000_000, latency=usual_latency(RATE))),
+            Motor(MotorConnection(bench.port, 4_000_000, latency=usual_latency(RATE), supervisor=supervisor)),
             SensorConnection("127.0.0.1", bench.ft_port, bench.page_port, 0.01), limits, STIFFNESS,
         )  # fmt: skip
         self.guarded = GuardedDevice(self.device, limits, RATE)

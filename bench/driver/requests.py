@@ -6,14 +6,20 @@ Each row is judged by the torque in the bench's own log while 10 N·m are comman
 from __future__ import annotations
 
 import resource
+import signal
+import sys
 import threading
+import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from subprocess import Popen
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from bench.driver.loop import RATE, Loop
 from rsea_ros.errors import DeviceError, ParameterError
+from rsea_ros.hardware import supervisor
 from rsea_ros.hardware.device import NoReply
 from rsea_ros.hardware.interlock import DeviceFault
 from rsea_ros.hardware.peer.remote import RemoteBench
@@ -163,6 +169,54 @@ def renamed_adapter(loop: Loop) -> tuple[str, str, bool]:
     return "portlost until it is back", f"{cause}; clear: {answer}; back: {again}", good
 
 
+def second_driver(loop: Loop) -> tuple[str, str, bool]:
+    """Another driver opens the motor that has one."""
+    loop.drive()
+    since = loop.bench.ask("torque")["t"]
+    try:
+        answer = f"opened, {Loop(loop.bench)}"
+    except DeviceError as error:
+        answer = f"{error}"
+    late = _acting(loop, since)[1]
+    good = "expected a serial port that is free" in answer and late > 0.9 * CYCLES
+    return "refused, the first goes on", f"{answer}; {late} writes of a torque", good
+
+
+def supervisor_service(number: signal.Signals) -> Trial:
+    """Return a trial of a signal to the service that is the driver's supervisor, under torque."""
+
+    def trial(child: Loop) -> tuple[str, str, bool]:
+        child.device.close()
+        with TemporaryDirectory() as folder:
+            path = Path(folder) / "supervisor"
+            words = [sys.executable, supervisor.__file__, "--listen", str(path)]
+            service = Popen(words)
+            while not path.exists():
+                time.sleep(0.01)
+            loop = Loop(child.bench, supervisor=str(path))
+            loop.drive()
+            service.send_signal(number)
+            cycles = 0
+            while loop.guarded.fault is None and cycles < 2 * RATE:
+                loop.cycle(10.0)
+                cycles += 1
+            cause, late = loop.guarded.fault, _acting(loop, child.bench.ask("torque")["t"])[1]
+            service.kill()
+            service.wait()
+            refused, service = loop.call("clear"), Popen(words)
+            while (again := loop.call("clear")) != "done" and cycles < 3 * RATE:
+                loop.cycle(10.0)
+                cycles += 1
+            loop.device.close()
+            service.kill()
+            service.wait()
+        told = f"{cause} after {cycles} cycles, {late} writes of a torque; clear: {refused}; then {again}"
+        good = f"{cause}".startswith("supervisorlost") and late == 0 and "listens there" in refused
+        return "supervisorlost, refused without it", told, good and again == "done"
+
+    return trial
+
+
 def tare_under_torque(loop: Loop) -> tuple[str, str, bool]:
     """zero_ft at 10 N m."""
     loop.drive()
@@ -212,7 +266,11 @@ def _wrong_unit(bench: RemoteBench, name: str, value: float, unit: str) -> Row:
     """A limit that was written in another unit."""
     try:
         values: dict[str, Any] = {p.name: p.check(value if p.name == name else p.default) for p in TABLE}
-        Loop(bench, limits_of(values)).device.close()
+        loop = Loop(bench, limits_of(values))
+        try:
+            limits_of(values, loop.device.rating)
+        finally:
+            loop.device.close()
         told = "accepted"
     except ParameterError as error:
         told = f"{error}"
@@ -224,7 +282,9 @@ UNITS = (
     ("torque_limit", 68_000.0, "N·mm"), ("torque_limit", 602.0, "lbf·in"), ("temperature_limit", 158.0, "°F"),
     ("temperature_limit", 343.0, "K"), ("voltage_limit", 200.0, "0.1 V"), ("current_limit", 12_000.0, "mA"),
     ("ft_limit", 110_000.0, "N·mm"), ("deflection_limit", 87.3, "mrad"), ("deflection_limit", 5.0, "°"),
-    ("velocity_limit", 286.0, "°/s"),
+    ("velocity_limit", 286.0, "°/s"), ("effort_limit", 600.0, "N·cm"), ("effort_limit", 53.0, "lbf·in"),
+    ("current_limit", 99.9, "dA"), ("voltage_limit", 2.0, "10 V"), ("voltage_limit", 0.02, "kV"),
+    ("power_limit", 2500.0, "dW"), ("soft_start", 5e5, "N·mm/s"),
 )  # fmt: skip
 TRIALS: dict[str, Trial] = {
     **{
@@ -243,6 +303,9 @@ TRIALS: dict[str, Trial] = {
     "position mode at clear": other_motor("clear", done=True, mode=3, torque_enable=0),
     "velocity mode at activation": other_motor("enable", mode=1, torque_enable=0, done=True),
     "adapter under a new name": renamed_adapter,
+    "two drivers on one motor": second_driver,
+    "supervisor service killed": supervisor_service(signal.SIGKILL),
+    "supervisor service stands still": supervisor_service(signal.SIGSTOP),
     "zero_ft under torque": tare_under_torque,
     "disk full": full_disk,
 }

@@ -57,7 +57,8 @@ REVERSED = {
 class Polarity:
     """Pulses until the signs are proven, then watches them.
 
-    proven: whether feedback may act. contradiction: in words, empty without one.
+    proven: whether feedback may act. contradiction: in words, empty without one. doubted: whether the ft of
+    the last reading is no torque.
     """
 
     def __init__(self, rig: Rig, rate: float, limit: float) -> None:
@@ -66,14 +67,14 @@ class Polarity:
         self._stiffness = rig["spring.stiffness"]
         self._stiffest = max(self._pulse, STIFFEST * limit)
         self._seen = SignEvidence(rig, rate, self._pulse)
-        self._change = SignChange(rig, rate, (self._seen.ft_noise, self._seen.noise))
+        self._change = SignChange(rig, rate, (self._seen.ft_noise, self._seen.noise), self._pulse)
         self._calm = max(LOUD * self._pulse, 3.0 * self._seen.ft_noise)
         self.start()
 
     def start(self) -> None:
         """Forget everything: nothing is proven."""
         self._seen.start()
-        self.proven, self.contradiction = False, ""
+        self.proven, self.contradiction, self.doubted, self._unheard = False, "", False, 0
         self._sent, self._made = [0.0] * SENT, [0.0] * SENT
         self._friction, self._off, self._alike = 0.0, 0, 0
         self._state, self._asked = (0.0, 0.0, 0.0), (0.0, 0.0)
@@ -106,8 +107,10 @@ class Polarity:
         self._sent = [torque, *self._sent[:-1]]
 
     def watch(self, reading: Measurement, missed: int = 0) -> str:
-        """Return a contradiction under torque, in words; empty without one."""
-        heard = self._seen.hear(reading, self._sent[1], missed, keep=False)
+        """Return a contradiction under torque, in words; empty without one. It sets doubted."""
+        self.doubted, lost = self._change.jump(reading, missed) != 0.0, missed + self._unheard
+        self._unheard = lost + 1 if self.doubted else 0
+        heard = None if self.doubted else self._seen.hear(reading, self._sent[1], lost, keep=False)
         self._made = [self._seen.made[1], *self._made[:-1]]
         made = reading.motor_torque if is_measured(reading.motor_torque, HUGE) else math.inf
         before, self._state = self._state, (reading.position, reading.velocity, made)
@@ -118,8 +121,8 @@ class Polarity:
         if self.contradiction:
             return self.contradiction
         rest = None if heard is None else self._made[0] - sum(heard)
-        if name := self._change.take(reading, rest, missed):
-            self._contradict(self._unless_frozen(f"{name} has changed its sign"))
+        if words := self._change.take(reading, rest, missed):
+            self._contradict(self._unless_frozen(words))
         if heard is None or self.contradiction:
             return self.contradiction
         ft, motion = heard
@@ -181,7 +184,7 @@ class Polarity:
         return 0.0
 
     def _grow(self) -> float:
-        if self._seen.way < BROKEN * self._pulse:
+        if self._seen.way < max(BROKEN * self._pulse, self._seen.unseen):
             self._broke = abs(self._torque)
         before = abs(self._torque)
         self._torque += self._direction * self._pulse * self._h / RISE

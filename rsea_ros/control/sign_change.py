@@ -1,5 +1,6 @@
 """Finds the sample in which ft or joint_states turned round, from two samples on, whatever the load does.
 
+    jump    a step of ft beyond a clamped spring that has not moved: no torque follows it
     ft      a step that its other sign undoes, beside a spring that has not moved; where its other side may
             move, also a momentum (sign_evidence.py) that is off by twice ft from there on
     angle   a step beside its speed that its other sign undoes
@@ -21,16 +22,24 @@ UNDONE = 0.4
 """Of a step: what its other sign may leave of it."""
 USUAL = 2.0
 """s over which steps are usual ones."""
+JUMP, JUMPED, LEAST, RECENT = 0.35, 8.0, 0.35, 0.25
+"""Of the largest |ft| of the last RECENT s, standard deviations of a usual step, and of a pulse: what a step
+of ft beyond the spring's is at most on a sound bench, modes and play among them (decision 332)."""
+BELIEVED, STIFF = 0.005, 1.3
+"""s for which a jump is held for a disturbance; factor by which the spring may be stiffer than stated."""
 
 
 class SignChange:
     """Takes samples in, and keeps what they change anyway: of ft, of the angle, of the momentum."""
 
-    def __init__(self, rig: Rig, rate: float, noise: tuple[float, float]) -> None:
-        """rate: Hz. noise: standard deviations of ft and of the momentum, N m."""
-        self._h = 1.0 / rate
+    def __init__(self, rig: Rig, rate: float, noise: tuple[float, float], pulse: float) -> None:
+        """rate: Hz. noise: standard deviations of ft and of the momentum, N m. pulse: N m."""
+        self._h, self._floor = 1.0 / rate, LEAST * pulse
+        self._patience = max(CYCLES, round(BELIEVED * rate))
         self._clamped, stiffness = rig.clamped == set(END_NAMES), rig["spring.stiffness"]
         self._stiffness, self._damping = stiffness, rig["spring.damping"]
+        stops = [effect.parameters["stiffness"] for effect in rig.effects if effect.name == "hard_stop"]
+        self._hardest = sum(stops, STIFF * stiffness)
         turn = spread(rig, "velocity") / rate
         angle = math.hypot(spread(rig, "position"), turn, noise[0] / stiffness / 10.0)
         self._least = [noise[0] ** 2, angle**2, noise[1] ** 2]
@@ -39,18 +48,32 @@ class SignChange:
     def start(self) -> None:
         """Forget everything."""
         self._before: tuple[Measurement, float] | None = None
-        self._usual, self._last = [*self._least], [0.0] * 3
+        self._usual, self._last, self._strongest = [*self._least], [0.0] * 3, 0.0
         self._forget()
 
     def _forget(self) -> None:
-        self._since = self._turned = self._counted = 0
+        self._since = self._turned = self._counted = self._jumps = 0
         self._off = self._due = 0.0
 
+    def jump(self, r: Measurement, missed: int) -> float:
+        """Return the step of ft that a clamped spring has not followed, N m; 0 where ft may be believed."""
+        since = self._since + 1 + missed
+        if not self._clamped or self._before is None or not r.is_whole or since > LOST:
+            return 0.0
+        before, _ = self._before
+        late = self._h * (before.velocity * before.ft_age - r.velocity * r.ft_age)  # ft of another instant
+        drag = STIFF * self._damping * (r.velocity - before.velocity)
+        turns = r.position - before.position, r.position - before.position + late
+        step = min((_beyond(r.ft - before.ft, self._hardest * turn + drag) for turn in turns), key=abs)
+        usual = JUMPED * since * math.sqrt(self._usual[0])
+        return step if abs(step) > max(self._floor, JUMP * self._strongest, usual) else 0.0
+
     def take(self, r: Measurement, rest: float | None, missed: int) -> str:
-        """Take a reading in; return what has turned round, empty where nothing surely has.
+        """Take a reading in; return what has turned round or jumped, in words, empty if nothing surely has.
 
         rest: N m, the momentum that nothing explains, None where it is not known. missed: samples lost.
         """
+        jump = self.jump(r, missed)
         self._since += 1 + missed
         if not r.is_whole:
             return ""
@@ -79,7 +102,11 @@ class SignChange:
                     self._due -= (2.0 if self._turned > 1 else 1.0) * r.ft
                     self._counted += 1
                 felt = self._clamped or self._odds(2, self._off, self._off - self._due, self._counted) > SURE
-                return name if self._turned >= CYCLES and (k == 1 or felt) else ""
+                sure = self._turned >= CYCLES and (k == 1 or felt)
+                return f"{name} has changed its sign" if sure else ""
+        if jump:
+            self._jumps += 1
+            return f"ft jumped by {jump:.3g} N·m beside the spring" if self._jumps >= self._patience else ""
         if self._since == 1 and rest is not None:
             self._last = [step**2 for step in (*steps, off)]
             part = self._h / USUAL
@@ -95,6 +122,7 @@ class SignChange:
 
     def _follow(self, r: Measurement, rest: float | None) -> str:
         """Compare the next samples with this one."""
+        self._strongest = max(abs(r.ft), self._strongest * (1.0 - self._h / RECENT))
         if rest is None:
             self._before = None if self._before is None else (r, self._before[1])
         else:

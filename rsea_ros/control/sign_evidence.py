@@ -49,7 +49,7 @@ class SignEvidence:
     """Takes readings in; pulses of torque begin and end between them. made: the last two motor torques, N m.
 
     unrest: RMS of what moves, N m. way, most: by how much the spring (by the gear's angle) and ft have moved
-    in the pulse, N m. heard: s.
+    in the pulse, N m. unseen: of that, what noise of the angle alone moves it by, N m. heard: s.
     """
 
     def __init__(self, rig: Rig, rate: float, pulse: float) -> None:
@@ -61,7 +61,9 @@ class SignEvidence:
         self.ft_noise = max(spread(rig, "ft"), 1e-3 * pulse)
         self.noise = math.hypot(noise, spread(rig, "motor_torque"))
         self._floor = max(MOVED * pulse, self.noise)
-        self._creep = max(CREEP, 4.0 * spread(rig, "velocity"))
+        self._creep, self._slip = max(CREEP, 4.0 * spread(rig, "velocity")), spread(rig, "velocity") * self._h
+        self.unseen = 2.0 * SIGMAS * self._stiffness * spread(rig, "position")
+        self._moved = max(MOVED * pulse, self.unseen)
         self._precision = 1.0 / (np.array([1.0, 1.0, 1.0, pulse, pulse]) * SPREADS) ** 2
         self.start()
 
@@ -84,7 +86,8 @@ class SignEvidence:
         """Count power and ways from here on."""
         assert self._before is not None
         self._pulsing, self._restless = True, self.unrest
-        self._work, self.most, self.way, self._driven, self._strongest = np.zeros(5), 0.0, 0.0, 0.0, 0.0
+        self._work, self.most, self.way, self._strongest = np.zeros(5), 0.0, 0.0, 0.0
+        self._driven, self._slipped = 0.0, 0.0
         self._ft, self._from = self._fast, self._before.position
 
     def end_pulse(self) -> None:
@@ -114,6 +117,7 @@ class SignEvidence:
             self._work += np.array([made * turn, abs(made * turn), taken, turn * turn, abs(turn)])
             self.most, self._strongest = max(self.most, abs(ft - self._ft)), max(self._strongest, abs(made))
             self._driven += speed * self._h * (1 + missed)
+            self._slipped = math.hypot(self._slipped, self._slip * (1 + missed))
             self.way = max(self.way, self._stiffness * abs(r.position - self._from))
         self._settle(ft, speed)
         if missed:
@@ -143,8 +147,10 @@ class SignEvidence:
     def turned(self) -> str:
         """Return in words that position and velocity went opposite ways in this pulse; empty where not."""
         gone = 0.0 if self._before is None else self._before.position - self._from
-        is_far = self._stiffness * abs(gone) > MOVED * self._pulse
-        opposite = is_far and self._driven * gone < 0.0 and abs(self._driven) > 0.5 * abs(gone)
+        if self._stiffness * abs(gone) <= self._moved:
+            return ""
+        against = math.copysign(self._driven, -self._driven * gone)
+        opposite = against > 0.5 * abs(gone) + SIGMAS * self._slipped
         return "position and velocity of joint_states go opposite ways" if opposite else ""
 
     def wrong_size(self) -> str:
@@ -152,13 +158,13 @@ class SignEvidence:
 
         A light load hides the size of ft: that is no fault.
         """
-        if self.most > GAIN * self.way + MOVED * self._pulse + 2.0 * SIGMAS * self._restless:
+        if self.most > GAIN * self.way + self._moved + 2.0 * SIGMAS * self._restless:
             return f"joint_states moved by {self.way:.3g} N·m of spring, ft by {self.most:.3g} N·m"
         ft, doubt = self._size()
         low, high = ft - doubt, ft + doubt
         if low > GAIN or 0.0 < low < high < 1.0 / GAIN:
             return f"ft is {1.0 / ft:.2g} times the torque by motor torque and motion"
-        beyond = MOVED * self._pulse + 2.0 * SIGMAS * self._restless
+        beyond = self._moved + 2.0 * SIGMAS * self._restless
         half = low > BOTH[1] and self.way > BOTH[0] * self.most + beyond
         double = 0.0 < high < 1.0 / BOTH[1] and self.most > BOTH[0] * self.way + beyond
         felt, made = min(self.way, self.most), self._strongest
@@ -220,7 +226,7 @@ class SignEvidence:
         made, whole, taken, square, way = self._work.tolist()
         cost, stored = 0.0, 0.5 * self._ft**2 / self._stiffness
         pushed = max(CLEAR * whole, stored, SIGMAS * self._restless * way)
-        if self.way > MOVED * self._pulse and abs(made) > pushed:
+        if self.way > self._moved and abs(made) > pushed:
             cost += POWER * (s_w * made < 0.0)
         if abs(taken) > SIGMAS * (self.ft_noise * math.sqrt(square) + self._restless * way):
             cost += POWER * (s_t * s_w * taken < 0.0)

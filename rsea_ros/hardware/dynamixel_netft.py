@@ -50,9 +50,12 @@ class DynamixelNetft:
 
     @property
     def rating(self) -> Rating:
-        """The motor's own torque limit, its speed without load, and the range of the sensor."""
+        """The motor's own limits, its speed without load, and the range of the sensor."""
         felt = math.inf if self._sensor is None else self._sensor.range[self._limits.ft_axis]
-        return Rating(self._motor.torque_limit, self._motor.control_table.no_load_speed, felt)
+        own, motor = self._motor.limits, self._motor
+        assert own is not None
+        supply = own.lowest_voltage, own.highest_voltage
+        return Rating(motor.torque_limit, motor.control_table.no_load_speed, felt, own.current, *supply)
 
     def open(self) -> None:
         """Connect to both and check the limits. Raises DeviceError, ParameterError; nothing stays open."""

@@ -31,7 +31,8 @@ class Limits:
     effort: N m by which the measured torque may miss the commanded one, for effort_time, s.
     command_timeout: s without a command while torque is commanded. ramp: s from then to zero torque.
     lost_cycles: cycles in a row without an answer, see Losses. ft_axis: place in the wrench.
-    derived: what says so, of each limit that nobody stated (derive).
+    derived: what says so, of each limit that nobody stated (derive). unlikely: stated ones that are a
+    hundredth of what is usual, in words.
     """
 
     torque: float
@@ -52,10 +53,14 @@ class Limits:
     effort_time: float = 0.1
     ft_axis: int = 5
     derived: Mapping[str, str] = field(default_factory=dict)
+    unlikely: str = ""
 
     def __str__(self) -> str:
-        """Return the limits of torque and motion, each derived one with its source."""
-        units = {"torque": "N·m", "velocity": "rad/s", "position": "rad", "deflection": "rad", "ft": "N·m"}
+        """Return the limits of torque, motion and motor, each derived one with its source."""
+        units = {
+            "torque": "N·m", "velocity": "rad/s", "position": "rad", "deflection": "rad", "ft": "N·m",
+            "effort": "N·m", "current": "A", "voltage": "V",
+        }  # fmt: skip
         parts = []
         for name, unit in units.items():
             value = getattr(self, name)
@@ -70,11 +75,15 @@ class Rating:
     """What motor and sensor can do at most; inf: unknown.
 
     torque: N m, of the motor. velocity: rad/s, of the gear output without load. ft: N m, about the axis.
+    current: A, of the motor. lowest, highest: V, of its supply.
     """
 
     torque: float = math.inf
     velocity: float = math.inf
     ft: float = math.inf
+    current: float = math.inf
+    lowest: float = 0.0
+    highest: float = math.inf
 
 
 UNRATED = Rating()

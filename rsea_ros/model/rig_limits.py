@@ -75,6 +75,41 @@ def derive(
     return limits, sources
 
 
+def derive_rest(
+    stated: Mapping[str, float], torque: float, motor: float, velocity: float,
+    rating: Mapping[str, float] = UNKNOWN,
+) -> tuple[dict[str, float], dict[str, str]]:  # fmt: skip
+    """Return limits of effort, error, current, voltage and power, and the source of those not stated.
+
+    stated: by name; inf: none. torque, velocity: their limits. motor: what the motor makes at most, N m.
+    rating: its current, A, lowest and highest voltage. Raises ParameterError for one beyond what it ever
+    reaches: it was written in another unit (decision 333).
+    """
+    lowest, current = rating.get("lowest", 0.0), rating.get("current", math.inf)
+    supply, own = 0.8 * lowest + 0.2 * rating.get("highest", math.inf), "times the motor's own limit"
+    limits, sources = {}, {}
+    for name, unit, (usual, source), least, most, why in (
+        ("effort", "N·m", min((6.0, "any motor"), (0.5 * torque, "half of torque_limit")),
+         0.0, 0.5 * motor, "half of what the motor makes"),
+        ("error", "N·m", min((15.0, "any motor"), (torque, "torque_limit")),
+         0.0, max(torque, 15.0), "torque_limit"),
+        ("current", "A", min((12.0, "any motor"), (1.2 * current, f"1.2 {own}")),
+         0.0, REACH * current, f"{REACH:g} {own}"),
+        ("voltage", "V", min((20.0, "any motor"), (supply, "a fifth above the motor's lowest")),
+         lowest / REACH, math.inf, f"the motor's lowest by {REACH:g}"),
+        ("power", "W", (POWER, "any motor"), 0.0, max(POWER, REACH * motor * velocity),
+         f"{REACH:g} times what the motor makes at velocity_limit"),
+    ):  # fmt: skip
+        value = limits[name] = stated.get(name, usual)
+        if name not in stated:
+            sources[name] = source
+        elif math.isfinite(value) and not least <= value <= most:
+            bound = f"at least {least:.4g}" if value < least else f"at most {most:.4g}"
+            told = f"parameter {name}_limit = {value:g} {unit}, expected {bound} {unit}, {why}"
+            raise ParameterError(told)
+    return limits, sources
+
+
 def felt_through_spring(limits: dict[str, float], sources: dict[str, str], rig: Rig) -> None:
     """Let ft limit the spring where the drive's angle is not the spring's, as with a free end."""
     if (bent := limits["deflection"] * rig["spring.stiffness"]) < limits["ft"]:

@@ -18,7 +18,7 @@ from rsea_ros.control.uncertainty import LIGHTEST, lightest, load_range
 from rsea_ros.errors import ParameterError
 from rsea_ros.hardware.device import State
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.model.rig_limits import SLEW, derive
+from rsea_ros.model.rig_limits import SLEW, derive, derive_rest
 from rsea_ros.nodes._devices import witnesses_of
 from rsea_ros.nodes._parameters import AXIS, DERIVED, JOINT, NodeParameter, stated_limits
 from rsea_ros.nodes._realtime import REALTIME
@@ -59,7 +59,8 @@ TABLE = (
     NodeParameter("stale", 0.05, "time without a measurement that ends the torque", "s", 0.005, 1.0),
     NodeParameter("release", 0.02, "from there to zero torque", "s", 0.0, 1.0),
     NodeParameter(
-        "error_limit", 15.0, "of the torque against the desired one, for error_time", "N m", 0.1, 1e3
+        "error_limit", DERIVED,
+        "of the torque against the desired one, for error_time; 0: none; -1: derived", "N m", DERIVED, 1e3,
     ),
     NodeParameter("error_time", 0.5, "for which the error may be larger", "s", 0.0, 60.0),
     NodeParameter(
@@ -74,8 +75,10 @@ TABLE = (
 
 def with_limits(values: Values) -> dict[str, Any]:
     """Return the values with the limits that the rig derives, as the driver's. Raises ParameterError."""
-    limits, _ = derive(stated_limits(values, ("torque", "ft")), load_rig(values["rig"]))
-    return {**values, "torque_limit": limits["torque"], "ft_limit": limits["ft"]}
+    stated = stated_limits(values, ("torque", "ft", "error"))
+    limits, _ = derive(stated, load_rig(values["rig"]))
+    limits |= derive_rest(stated, limits["torque"], limits["torque"], limits["velocity"])[0]
+    return {**values, **{f"{name}_limit": limits[name] for name in ("torque", "ft", "error")}}
 
 
 def design_of(values: Values) -> ControllerDesign:

@@ -21,46 +21,27 @@ MOTOR = (
     NodeParameter(
         "model", 0, "number that the motor must have (docs/hardware.md); 0: any that is known", "", 0, 65535
     ),
-    NodeParameter(
-        "torque_constant",
-        0.0,
-        "torque at the gear output for a current; 0: that of the model's table",
-        "N m/A",
-        0.0,
-        100.0,
-    ),
-    NodeParameter(
-        "position_zero",
-        "configure",
-        "where angles are zero: where configure finds it, or the motor's own zero",
-        choices=("configure", "motor"),
-    ),
-    NodeParameter(
-        "latency",
-        0.0,
-        "what adapter and host may add to a reply; 0: by the rate, docs/hardware.md",
-        "s",
-        0.0,
-        0.1,
-    ),
-    NodeParameter(
-        "watchdog", 0.1, "time without the driver after which the motor is stopped", "s", 0.02, 2.5
-    ),
+    NodeParameter("torque_constant", 0.0,
+                  "torque at the gear output for a current; 0: that of the model's table",
+                  "N m/A", 0.0, 100.0),
+    NodeParameter("position_zero", "configure", choices=("configure", "motor"),
+                  description="where angles are zero: where configure finds it, or the motor's own zero"),
+    NodeParameter("latency", 0.0,
+                  "what adapter and host may add to a reply; 0: by the rate, docs/hardware.md",
+                  "s", 0.0, 0.1),
+    NodeParameter("watchdog", 0.1,
+                  "time without the driver after which the motor is stopped", "s", 0.02, 2.5),
     NodeParameter("supervisor", "", "socket of a supervisor that runs as a service; empty: a child process"),
-)
+)  # fmt: skip
 ENCODER = (
-    NodeParameter(
-        "encoder_id", -1, "of an encoder on the motor's bus that measures the spring; -1: none", "", -1, 252
-    ),
+    NodeParameter("encoder_id", -1, "of an encoder on the motor's bus that measures the spring; -1: none",
+                  "", -1, 252),
     NodeParameter("encoder_address", 132, "of its angle, 4 bytes, signed", "", 0, 65535),
-    NodeParameter(
-        "encoder_pulses", 4096.0, "counts of a turn; negative: they fall as the angle grows", "", -1e9, 1e9
-    ),
-    NodeParameter(
-        "encoder_place", SPRING,
-        "what it measures: the spring's deflection, or the link relative to the housing",
-        choices=(SPRING, LINK),
-    ),
+    NodeParameter("encoder_pulses", 4096.0, "counts of a turn; negative: they fall as the angle grows",
+                  "", -1e9, 1e9),
+    NodeParameter("encoder_place", SPRING,
+                  "what it measures: the spring's deflection, or the link relative to the housing",
+                  choices=(SPRING, LINK)),
 )  # fmt: skip
 SAFETY = (
     NodeParameter(
@@ -86,7 +67,7 @@ LIMITS = (
     ),
     NodeParameter("slew_limit", SLEW, "largest change of torque in a second", "N m/s", 1.0, 1e6),
     NodeParameter(
-        "soft_start", 500.0, "growth of the limit after activation, fault, pause", "N m/s", 1.0, 1e6
+        "soft_start", 500.0, "growth of the limit after activation, fault, pause", "N m/s", 1.0, 1e5
     ),
     NodeParameter("deflection_limit", DERIVED, "of the spring; 0: none; -1: derived", "rad", DERIVED, 100.0),
     NodeParameter(
@@ -100,11 +81,16 @@ LIMITS = (
         "ft_limit", DERIVED, "of the torque that ft measures; 0: none; -1: derived", "N m", DERIVED, 1000.0
     ),
     NodeParameter("power_limit", POWER, "of the motor torque times velocity; 0: none", "W", 0.0, 1e5),
-    NodeParameter("effort_limit", 6.0, "by which measured may miss commanded; 0: none", "N m", 0.0, 1000.0),
+    NodeParameter(
+        "effort_limit", DERIVED, "by which measured may miss commanded; 0: none; -1: derived", "N m",
+        DERIVED, 1000.0,
+    ),
     NodeParameter("effort_time", 0.1, "for which it may", "s", 0.0, 10.0),
     NodeParameter("temperature_limit", 70.0, "of the motor; 0: none", "°C", 0.0, 100.0),
-    NodeParameter("current_limit", 12.0, "of the motor, measured; 0: none", "A", 0.0, 100.0),
-    NodeParameter("voltage_limit", 20.0, "lowest supply voltage; 0: none", "V", 0.0, 100.0),
+    NodeParameter(
+        "current_limit", DERIVED, "of the motor, measured; 0: none; -1: derived", "A", DERIVED, 100.0
+    ),
+    NodeParameter("voltage_limit", DERIVED, "lowest supply; 0: none; -1: derived", "V", DERIVED, 100.0),
     NodeParameter("command_timeout", 0.05, "time without a command that ends the torque", "s", 0.001, 10.0),
     NodeParameter("ramp", 0.02, "from there to zero torque", "s", 0.0, 10.0),
     NodeParameter("lost_cycles", 3, "cycles in a row without an answer that are a fault", "", 1, 100),

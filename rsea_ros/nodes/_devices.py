@@ -21,12 +21,14 @@ from rsea_ros.hardware.outside import outside_device
 from rsea_ros.hardware.witnesses import Actuator, Witnesses
 from rsea_ros.model.rig import END_NAMES, Rig, motor_torque
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.model.rig_limits import derive, felt_through_spring
+from rsea_ros.model.rig_limits import derive, derive_rest, felt_through_spring
 from rsea_ros.nodes._parameters import stated_limits
 
 Values = Mapping[str, Any]
 
-DERIVABLE = ("torque", "deflection", "velocity", "ft")
+DERIVABLE = ("torque", "deflection", "velocity", "ft", "effort", "current", "voltage", "power")
+TINY = 0.01
+"""Of the limit that would be derived: a stated one below that is warned of, as one in another unit."""
 
 
 def limits_of(values: Values, rating: Rating = UNRATED) -> Limits:
@@ -45,6 +47,15 @@ def limits_of(values: Values, rating: Rating = UNRATED) -> Limits:
                 f" ({why}), expected 0 for none"
             )
     limits, sources = derive(stated, rig, vars(rating))
+    motor = max(min(motor_torque(rig)[0], rating.torque), stated.get("torque", 0.0))
+    able = limits["torque"], motor, limits["velocity"], vars(rating)
+    more, whence = derive_rest(stated, *able)
+    limits, sources = limits | more, sources | whence
+    usual = derive({}, rig, vars(rating))[0] | derive_rest({}, *able)[0]
+    unlikely = [
+        f"{name}_limit = {value:g}, where {usual[name]:.4g} is usual: is it in another unit?"
+        for name, value in stated.items() if value < TINY * usual[name]
+    ]  # fmt: skip
     for name, why in inapplicable.items():
         limits[name] = math.inf
         if name in sources:
@@ -57,20 +68,21 @@ def limits_of(values: Values, rating: Rating = UNRATED) -> Limits:
         slew=values["slew_limit"],
         deflection=limits["deflection"],
         temperature=values["temperature_limit"] or math.inf,
-        current=values["current_limit"] or math.inf,
-        voltage=values["voltage_limit"],
+        current=limits["current"],
+        voltage=limits["voltage"] if math.isfinite(limits["voltage"]) else 0.0,
         command_timeout=values["command_timeout"],
         ramp=values["ramp"],
         lost_cycles=max(values["lost_cycles"], math.ceil(values["lost_time"] * values["rate"])),
         velocity=limits["velocity"],
         position=values["position_limit"] or math.inf,
         ft=limits["ft"],
-        power=values["power_limit"] or math.inf,
+        power=limits["power"],
         soft_start=values["soft_start"],
-        effort=values["effort_limit"] or math.inf,
+        effort=limits["effort"],
         effort_time=values["effort_time"],
         ft_axis=sign_and_index(values["axis"])[1],
         derived=sources,
+        unlikely="; ".join(unlikely),
     )
 
 

@@ -74,6 +74,8 @@ class DrivenJoint:
         if (number := health.get("ft_low_pass", "0")) != "0":
             text = f"F/T sensor: low pass (setuserfilter) {number}; the rig states it as sensors.ft.filter"
             self._node.get_logger().info(self.with_name(text))
+        if limits.unlikely:
+            self._node.get_logger().warning(self.with_name(limits.unlikely))
         self.topics = BenchTopics(
             self._node, {**values, "torque_limit": limits.torque}, strict=True,
             every_record=values["ft_all"], part=self.part, deflects=self.guarded.measures_deflection(),

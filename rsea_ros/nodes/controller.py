@@ -7,6 +7,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 from rclpy.node import Node
@@ -140,6 +141,8 @@ class ControllerNode:
             missed = 0
         elif self._polarity.watch(reading, missed):
             return 0.0
+        elif self._polarity.doubted:
+            reading = replace(reading, ft=math.nan)  # a lost sample
         elif self._held != before:
             self._controller.start(reading, self._desired.torque)
             missed = 0

@@ -33,7 +33,7 @@ WAVES = {
 
 def bench(rig, plant=None):
     """The driver's device on a simulated plant, a clock for it, and the device."""
-    values = {p.name: p.default for p in driver.TABLE} | {"rig": rig, "soft_start": 1e6}
+    values = {p.name: p.default for p in driver.TABLE} | {"rig": rig, "soft_start": 1e5}
     now = [1_700_000_000 * SECOND]
     device = SimulatedDevice(plant or load_rig(rig), RATE, clock=lambda: now[0])
     guarded = GuardedDevice(
@@ -205,7 +205,7 @@ def test_a_rest_does_not_make_a_falsified_zero_the_true_one(monkeypatch):
 
 def test_a_slow_rate_does_not_let_the_low_pass_run_away():
     """Below 17 Hz a sound machine had 1e15 N m, and a fault."""
-    values = {p.name: p.default for p in driver.TABLE} | {"rig": RIG, "rate": 12.0, "soft_start": 1e6}
+    values = {p.name: p.default for p in driver.TABLE} | {"rig": RIG, "rate": 12.0, "soft_start": 1e5}
     now = [1_700_000_000 * SECOND]
     device = SimulatedDevice(load_rig(RIG), 12.0, clock=lambda: now[0])
     guarded = GuardedDevice(

@@ -24,11 +24,12 @@ def program(listener, monkeypatch):
     monkeypatch.setattr(controller, "controller_of", lambda values, design, link: stub)
     monkeypatch.setattr(controller, "keep_time", lambda *worker: None)
     values = {parameter.name: parameter.default for parameter in controller.TABLE} | {"rate": 1000.0}
-    made = controller.ControllerNode(listener.node, values | {"ft_limit": 1e3, "error_limit": 1e3})
+    made = controller.ControllerNode(listener.node, values | {"ft_limit": 1e3, "error_limit": 0.0})
     made.sent = []
     made._polarity = SimpleNamespace(
-        proven=True, contradiction="", start=lambda: None, watch=lambda *now: "", sent=lambda torque: None
-    )
+        proven=True, contradiction="", start=lambda: None, watch=lambda *now: "",
+        sent=lambda torque: None, doubted=False,
+    )  # fmt: skip
     made._writer = SimpleNamespace(write=lambda stamp, torques: (stamp, *torques))
     made._commands = SimpleNamespace(publish=made.sent.append)
     return made

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 from types import SimpleNamespace
 
@@ -49,7 +50,7 @@ def made(monkeypatch):
     )  # fmt: skip
     node._polarity = SimpleNamespace(
         proven=True, contradiction="", start=lambda: calls.append("polarity"), watch=lambda r, m: False,
-        sent=lambda torque: calls.append(("sent", torque)), probe=lambda *a, **k: None,
+        sent=lambda torque: calls.append(("sent", torque)), probe=lambda *a, **k: None, doubted=False,
     )  # fmt: skip
     share = SimpleNamespace(feedback=0.5, compensation=0.25, limited=True)
     node._controller = SimpleNamespace(
@@ -182,6 +183,10 @@ def test_signs_are_probed_first_and_a_torque_that_comes_back_starts_anew(made):
     del calls[:]
     node._next_torque(READING, 3, 1.0, 0.0, acts=True)
     assert calls[0][0] == (1.5, 3)
+    felt = []
+    node._polarity.doubted, node._controller.step = True, lambda r, *a, **k: felt.append(r.ft) or 2.5
+    assert node._next_torque(READING, 0, 1.0, 0.0, acts=True) == 2.5 and math.isnan(felt[0])
+    node._polarity.doubted = False
     probed = []
     node._polarity.proven = False
     node._polarity.probe = lambda *a, **k: probed.append((a[1:], k)) or 0.25

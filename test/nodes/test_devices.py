@@ -109,6 +109,64 @@ def test_a_limit_that_is_stated_wins_unless_the_hardware_cannot_do_it():
             limits_of(DEFAULTS | {f"{name}_limit": 20.0}, rating)
 
 
+PRO, SMALL = (Rating(68.2, 3.5, 120.0, 9.99, 15.0, 40.0), Rating(2.13, 4.9, 20.0, 3.21, 9.5, 16.0))
+"""Of an H54 and of an XM430 at 12 V."""
+
+
+@pytest.mark.parametrize(
+    ("name", "rating", "value", "expected"),
+    [
+        ("effort", PRO, None, 6.0), ("effort", SMALL, None, 0.5 * 2.13), ("effort", PRO, 34.0, 34.0),
+        ("effort", PRO, 53.0, "53 N·m, expected at most 34 N·m, half of what the motor makes"),
+        ("effort", SMALL, 6.0, "6 N·m, expected at most 1.065 N·m"),
+        ("current", PRO, None, 1.2 * 9.99), ("current", SMALL, None, 1.2 * 3.21),
+        ("current", PRO, 0.0, math.inf),
+        ("current", PRO, 29.9, 29.9), ("current", PRO, 30.0, "30 A, expected at most 29.97 A, 3 times"),
+        ("voltage", PRO, None, 20.0), ("voltage", SMALL, None, 10.8), ("voltage", PRO, 0.0, 0.0),
+        ("voltage", PRO, 5.0, 5.0),
+        ("voltage", PRO, 2.0, "2 V, expected at least 5 V, the motor's lowest by 3"),
+        ("power", PRO, 250.0, 250.0), ("power", PRO, 480.0, 480.0),
+        ("power", PRO, 2500.0, "2500 W, expected at most 480.7 W, 3 times what the motor makes at velocity"),
+    ],
+)  # fmt: skip
+def test_limits_of_the_motor_are_derived_and_refused_in_another_unit(name, rating, value, expected):
+    """600 N·m of effort, 30 A and 2 V were taken as they came, and 6 N·m limited no small motor."""
+    values = DEFAULTS | ({} if value is None else {f"{name}_limit": value})
+    if isinstance(expected, str):
+        with pytest.raises(ParameterError, match=f"{name}_limit = {expected}"):
+            limits_of(values, rating)
+    else:
+        made = limits_of(values, rating)
+        assert getattr(made, name) == pytest.approx(expected)
+        assert (name in made.derived) == (value is None)
+
+
+@pytest.mark.parametrize(
+    ("values", "told"),
+    [({}, ""), ({"torque_limit": 0.69}, ""), ({"effort_limit": 0.061}, ""), ({"voltage_limit": 5.0}, ""),
+     ({"torque_limit": 0.068}, "torque_limit = 0.068, where 68 is usual: is it in another unit?"),
+     ({"effort_limit": 0.006, "velocity_limit": 0.002}, "velocity_limit = 0.002, where 2.356 is usual:"
+      " is it in another unit?; effort_limit = 0.006, where 6 is usual: is it in another unit?")],
+)  # fmt: skip
+def test_a_limit_that_lets_nothing_move_is_told(values, told):
+    assert limits_of(DEFAULTS | values, PRO).unlikely == told
+
+
+@pytest.mark.parametrize(("rig", "value", "expected"), [
+    ("paper_high_impedance", -1.0, 15.0), ("pd_joint", -1.0, None), ("paper_high_impedance", 67.0, 67.0),
+    ("paper_high_impedance", 150.0, "error_limit = 150 N·m, expected at most 68 N·m, torque_limit"),
+])  # fmt: skip
+def test_an_error_that_no_torque_makes_is_no_limit(rig, value, expected):
+    values = {parameter.name: parameter.default for parameter in _control.TABLE}
+    values |= {"rig": rig, "error_limit": value}
+    if isinstance(expected, str):
+        with pytest.raises(ParameterError, match=expected):
+            _control.with_limits(values)
+    else:
+        made = _control.with_limits(values)
+        assert made["error_limit"] == (min(made["torque_limit"], 15.0) if expected is None else expected)
+
+
 class Clock:
     """A clock that stands where it is put, ns."""
 

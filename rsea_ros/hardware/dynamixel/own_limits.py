@@ -71,7 +71,7 @@ def check_own_limits(limits: Limits, motor_limits: OwnLimits, name: str) -> None
             f"temperature_limit = {limits.temperature:g} °C, expected at most"
             f" {motor_limits.temperature:g} °C, where the motor switches itself off"
         )
-    if limits.voltage >= motor_limits.highest_voltage:
+    if "voltage" not in limits.derived and limits.voltage >= motor_limits.highest_voltage:
         wrong.append(
             f"voltage_limit = {limits.voltage:g} V, expected less than"
             f" {motor_limits.highest_voltage:.4g} V, the most that the motor takes"
