@@ -33,20 +33,16 @@ def document(path: Path, data: bytes) -> Any:
     except UnicodeDecodeError as error:
         raise NotUnderstood(no_utf_8(error)) from None
     try:
-        _check(path, text)
+        depth = 0
+        for event in yaml.parse(text, _Loader):
+            if isinstance(event, yaml.AliasEvent):
+                raise BagError(f"{path}: has an alias (*{brief(str(event.anchor))}), expected none")
+            depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
+            if depth > DEEPEST:
+                raise BagError(f"{path}: nested more than {DEEPEST} deep, expected the metadata of a bag")
         return yaml.load(text, _Loader)
     except yaml.YAMLError as error:
         raise NotUnderstood(brief(" ".join(str(error).split()))) from None
-
-
-def _check(path: Path, text: str) -> None:
-    depth = 0
-    for event in yaml.parse(text, _Loader):
-        if isinstance(event, yaml.AliasEvent):
-            raise BagError(f"{path}: has an alias (*{brief(str(event.anchor))}), expected none")
-        depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
-        if depth > DEEPEST:
-            raise BagError(f"{path}: nested more than {DEEPEST} deep, expected the metadata of a bag")
 
 
 NAME = "metadata.yaml"

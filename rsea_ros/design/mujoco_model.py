@@ -117,24 +117,17 @@ def model_element(rig: Rig, play: float = 0.0) -> xml.Element:
     root = xml.Element("mujoco", model=rig.name)
     xml.SubElement(root, "compiler", angle="radian")
     gravity = f"0 {-STANDARD_GRAVITY} 0"
-    xml.SubElement(
-        root, "option", timestep=f"{STEP:g}", integrator="RK4", gravity=gravity, tolerance="1e-12"
-    )
+    xml.SubElement(root, "option", timestep=f"{STEP:g}", integrator="RK4", gravity=gravity, tolerance="1e-12")
     is_stiff = math.isinf(rig["gear.stiffness"]) and not play
     parents = _bodies(rig, mesh, xml.SubElement(root, "worldbody"), is_stiff)
     _join(rig, mesh, parents, root, play)
-    _sensors(root)
-    return root
-
-
-def _sensors(root: xml.Element) -> None:
-    """Add the sensors: angle and speed of the output against the housing, and of the springs."""
     sensors = xml.SubElement(root, "sensor")
     tendons = {one.get("name", "") for one in root.iter("fixed")}
     for tendon, name in SENSED.items():
         if tendon in tendons and not (tendon == "motor" and "encoder" in tendons):
             xml.SubElement(sensors, "tendonpos", name=name, tendon=tendon)
             xml.SubElement(sensors, "tendonvel", name=f"{name}_rate", tendon=tendon)
+    return root
 
 
 def _bodies(rig: Rig, mesh: Mesh, world: xml.Element, is_stiff: bool) -> Mapping[str, str | None]:

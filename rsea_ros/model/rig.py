@@ -328,7 +328,11 @@ def check_structure(rig: Rig) -> None:
     _check_spring(rig)
     for name in ("rotor.reflected_inertia", "rotor.reflected_damping"):
         rig[name]
-    _check_encoder_end(rig)
+    if rig.encoder_end not in ("gear_output", "spring_end"):
+        raise RigError(
+            f"rig {rig.name}: encoder_end = {rig.encoder_end!r}, expected gear_output or spring_end",
+            "encoder_end",
+        )
     _check_loop(rig)
     for end in END_NAMES:
         if rig.end_is_free(end):
@@ -371,14 +375,6 @@ def _check_spring(rig: Rig) -> None:
         raise RigError(
             f"rig {rig.name}: spring.stiffness {value}, expected a value in N·m/rad or `rigid: true`",
             "spring.stiffness",
-        )
-
-
-def _check_encoder_end(rig: Rig) -> None:
-    if rig.encoder_end not in ("gear_output", "spring_end"):
-        raise RigError(
-            f"rig {rig.name}: encoder_end = {rig.encoder_end!r}, expected gear_output or spring_end",
-            "encoder_end",
         )
 
 

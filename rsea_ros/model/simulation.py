@@ -412,13 +412,6 @@ def synthesize(rig: Rig, command: Channel, *, seed: int = 0, noise: bool = True)
     )
     rng = sensor_noise(seed)
     true = simulate(rig, blank_record)
-    _check_bounded(rig, true)
-    measured = {n: Channel(stamps, measure(rig, n, true[n], rng) if noise else true[n]) for n in names}
-    return blank_record.with_channels(**measured)
-
-
-def _check_bounded(rig: Rig, true: Mapping[str, FloatArray]) -> None:
-    """Raise RigError for a simulation that runs away: no sensor could measure it, no file should hold it."""
     for name, y in true.items():
         bad = ~(np.abs(y) <= LARGEST)
         if bad.any():
@@ -427,6 +420,8 @@ def _check_bounded(rig: Rig, true: Mapping[str, FloatArray]) -> None:
                 f"rig {rig.name}: its simulation runs away, {name} is {y[k]:g} at sample {k}, "
                 f"expected at most {LARGEST:g}: check the rig's values and effects"
             )
+    measured = {n: Channel(stamps, measure(rig, n, true[n], rng) if noise else true[n]) for n in names}
+    return blank_record.with_channels(**measured)
 
 
 def sensor_noise(seed: int) -> np.random.Generator:

@@ -81,7 +81,11 @@ class NewFiles:
                 error = failure
                 raise
             finally:
-                _name_finally(error, self._stage.path, self.folder)
+                if isinstance(error, (OSError, RseaError)):
+                    change = str(self._stage.path), str(self.folder)
+                    error.args = tuple(a.replace(*change) if isinstance(a, str) else a for a in error.args)
+                    if isinstance(error, OSError) and isinstance(error.filename, str):
+                        error.filename = error.filename.replace(*change)
                 self._clear(complete)
 
     def _make_folder(self) -> Path:
@@ -141,12 +145,3 @@ def _touches(path: Path, one: Path) -> bool:
     """Return whether a path is an input, by any name, or lies in it."""
     whole, place = one.resolve(), path.resolve()
     return whole in (place, *place.parents) or (path.exists() and path.samefile(one))
-
-
-def _name_finally(error: BaseException | None, stage: Path, folder: Path) -> None:
-    """Let an error name the file as it would be named in the end."""
-    if isinstance(error, (OSError, RseaError)):
-        change = str(stage), str(folder)
-        error.args = tuple(a.replace(*change) if isinstance(a, str) else a for a in error.args)
-        if isinstance(error, OSError) and isinstance(error.filename, str):
-            error.filename = error.filename.replace(*change)

@@ -54,7 +54,15 @@ def _blocks(result: LawResult) -> Iterator[html.Block]:
         yield overlay_figure("The same over time", *missing, s.t, s.values, curves)
     if result.dependences:
         yield _dependences(result)
-    yield _gain(result)
+    plain = "Residual, RMS, on blocks of time that took part in no fit."
+    shown = html.listed(
+        result.before,
+        ("Channel", words.channel),
+        ("#without", lambda n: words.quantity(result.before[n], UNITS[n], 3)),
+        ("#with the law", lambda n: words.quantity(result.after[n], UNITS[n], 3)),
+        ("#noise", lambda n: words.quantity(result.noise[n], UNITS[n], 3)),
+    )
+    yield html.section("Gain", shown, caption=gain_sentence(result) if result.laws else plain)
     if result.tried:
         yield _tried(result)
     if result.laws:
@@ -86,18 +94,6 @@ def _dependences(result: LawResult) -> html.Html:
         caption="Laws without a form, a spline or a memory each, fitted to some blocks of time and judged on "
         "others: share of the power above the noise that they take.",
     )  # fmt: skip
-
-
-def _gain(result: LawResult) -> html.Html:
-    plain = "Residual, RMS, on blocks of time that took part in no fit."
-    shown = html.listed(
-        result.before,
-        ("Channel", words.channel),
-        ("#without", lambda n: words.quantity(result.before[n], UNITS[n], 3)),
-        ("#with the law", lambda n: words.quantity(result.after[n], UNITS[n], 3)),
-        ("#noise", lambda n: words.quantity(result.noise[n], UNITS[n], 3)),
-    )
-    return html.section("Gain", shown, caption=gain_sentence(result) if result.laws else plain)
 
 
 def _tried(result: LawResult) -> html.Html:
