@@ -12,10 +12,8 @@ from types import TracebackType
 
 import numpy as np
 
-from msg_adapters import metadata
-from msg_adapters.contents import Remarks
+from msg_adapters.contents import METADATA, Remarks, Topic, metadata_text
 from msg_adapters.mcap_storage import McapStorage
-from msg_adapters.metadata import Topic
 from msg_adapters.sqlite_file import SqliteStorage
 from msg_adapters.topic_map import check_topic, definition
 from rsea_ros.errors import BagError, OutputError
@@ -182,7 +180,7 @@ class BagWriter:
             except OutputError as error:
                 raise BagError(str(error)) from None
             inside = self.path.iterdir() if self.path.is_dir() else ()
-            if any(file.name != metadata.NAME and file.suffix not in PARTS for file in inside):
+            if any(file.name != METADATA and file.suffix not in PARTS for file in inside):
                 raise BagError(f"{self.path}: holds more than a bag, expected a new name")
 
     def _new_directory(self) -> Path:
@@ -201,7 +199,7 @@ class BagWriter:
     def _complete(self) -> None:
         """Close the file, add the metadata, and move everything to its name."""
         file, topics = self._storage.path, [topic for _, topic in self._topics.values()]
-        known = metadata.text(file, self._kind, topics, self._span, self.remarks)
+        known = metadata_text(file, self._kind, topics, self._span, self.remarks)
         if self._single:
             self._storage.remark(self.remarks.texts(), known)
         self._storage.close()
@@ -209,8 +207,8 @@ class BagWriter:
             files.give_names([(file, self.path)], force=self._force)
             files.remove(self.partial)
             return
-        files.remove(self.partial / metadata.NAME)
-        files.write_new(self.partial / metadata.NAME, known)
+        files.remove(self.partial / METADATA)
+        files.write_new(self.partial / METADATA, known)
         files.give_names([(self.partial, self.path)], force=self._force)
 
     def _clear(self) -> None:

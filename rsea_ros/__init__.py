@@ -65,7 +65,14 @@ __all__ = [
 
 
 class _Study(ModuleType):
-    """A package that can be called as the function of its name: `rsea.design(torque=40.0)`."""
+    # A package that can be called as the function of its name: `rsea.design(torque=40.0)`.
+
+    @property
+    def __doc__(self) -> str:  # type: ignore[override]
+        """What `help(rsea.design)` shows."""
+        from inspect import signature
+
+        return f"{self.__name__}{signature(self.__wrapped__)}\n\n{self.__wrapped__.__doc__}"
 
     @property
     def __wrapped__(self) -> Any:

@@ -12,6 +12,7 @@ import numpy as np
 from rsea_ros.design import mechanism
 from rsea_ros.design.mechanism import Requirement, spring_rate
 from rsea_ros.design.motor_gear_units import MotorGear
+from rsea_ros.errors import ParameterError
 from rsea_ros.model import transfer
 from rsea_ros.model.rig import END_NAMES, Quantity, Rig
 from rsea_ros.model.train import Train
@@ -140,8 +141,15 @@ def bisect(reaches: Callable[[float], bool], low: float, high: float, rounds: in
 
 
 def least_stiffness(requirement: Requirement, unit: MotorGear) -> float:
-    """Return the least K_s, N m/rad, that meets every demand on the spring."""
-    return max(stiffness_bounds(requirement, unit).values())
+    """Return the least K_s, N m/rad, that meets every demand on the spring.
+
+    Raises ParameterError for a demand that no spring of a possible size meets.
+    """
+    demand, least = max(stiffness_bounds(requirement, unit).items(), key=lambda item: item[1])
+    if least > mechanism.RANGE[1]:
+        most = f"expected one that a spring of {mechanism.RANGE[1]:g} N·m/rad meets"
+        raise ParameterError(f"demand “{demand}” asks for a spring of {least:.3g} N·m/rad, {most}")
+    return least
 
 
 def rig_of(requirement: Requirement, unit: MotorGear, stiffness: float) -> Rig:
@@ -200,7 +208,7 @@ def _with_train(r: Requirement, unit: MotorGear, stiffness: float) -> WithTrain:
         band=design.band_exact,
         band_range=band_range(stiffness, r.inertia, unit.spin, unit.rotor_spread),
         for_band=least_for_band(r, unit),
-        least=least_stiffness(r, unit),
+        least=max(stiffness_bounds(r, unit).values()),
     )
 
 

@@ -31,7 +31,7 @@ from rsea_ros.records.record import FloatArray
 from rsea_ros.records.statistics import Z95
 
 FREEDOM = 4.0
-WHITE = 2.5 * 0.19366
+WHITE = 0.48438
 """Mean cost of an innovation of variance 1: 2.5 E log(1 + z^2 / 4), z normal."""
 ROUNDS, SHORTEST = 8, 0.02
 """Steps of Gauss-Newton; a step so small beside its own sigma, or beside `least`, is the last."""

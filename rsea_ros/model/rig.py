@@ -323,16 +323,21 @@ def check_structure(rig: Rig) -> None:
     """Raise RigError where parts of a rig contradict each other, or one is missing."""
     for end in set(rig.clamped) - set(END_NAMES):
         raise RigError(f"rig {rig.name}: clamped end {end!r}, expected one of {', '.join(END_NAMES)}")
-    _check_trains(rig)
-    _check_sensor_end(rig)
+    for key, value, allowed in (
+        ("gear.train", rig.train, TRAINS), *(("gear.or", train, TRAINS) for train in rig.other_trains),
+        ("proximal", rig.proximal, END_NAMES), ("ft_end", rig.ft_end, END_NAMES),
+        ("encoder_end", rig.encoder_end, ("gear_output", "spring_end")),
+    ):  # fmt: skip
+        if value not in allowed:
+            raise RigError(f"rig {rig.name}: {key} = {value!r}, expected one of {', '.join(allowed)}", key)
+    if rig.ft_end == "housing_end" and math.isinf(rig["proximal_spring.stiffness"]):
+        raise RigError(
+            f"rig {rig.name}: ft_end = housing_end without proximal_spring.stiffness, expected that of the "
+            "sensor, N·m/rad"
+        )
     _check_spring(rig)
     for name in ("rotor.reflected_inertia", "rotor.reflected_damping"):
         rig[name]
-    if rig.encoder_end not in ("gear_output", "spring_end"):
-        raise RigError(
-            f"rig {rig.name}: encoder_end = {rig.encoder_end!r}, expected gear_output or spring_end",
-            "encoder_end",
-        )
     _check_loop(rig)
     for end in END_NAMES:
         if rig.end_is_free(end):
@@ -343,26 +348,6 @@ def check_two_torques(rig: Rig) -> None:
     """Raise RigError for a rig without a spring: it has one torque, not one on either side."""
     if rig.rigid_spring:
         raise RigError(f"rig {rig.name}: spring.rigid = True, expected a spring with a torque on either side")
-
-
-def _check_trains(rig: Rig) -> None:
-    expected = f"expected one of {', '.join(TRAINS)}"
-    if rig.train not in TRAINS:
-        raise RigError(f"rig {rig.name}: gear.train = {rig.train!r}, {expected}", "gear.train")
-    for train in rig.other_trains:
-        if train not in TRAINS:
-            raise RigError(f"rig {rig.name}: gear.or has {train!r}, {expected}", "gear.or")
-
-
-def _check_sensor_end(rig: Rig) -> None:
-    for key, end in (("proximal", rig.proximal), ("ft_end", rig.ft_end)):
-        if end not in END_NAMES:
-            raise RigError(f"rig {rig.name}: {key} = {end!r}, expected one of {', '.join(END_NAMES)}", key)
-    if rig.ft_end == "housing_end" and math.isinf(rig["proximal_spring.stiffness"]):
-        raise RigError(
-            f"rig {rig.name}: ft_end = housing_end without proximal_spring.stiffness, expected that of the "
-            "sensor, N·m/rad"
-        )
 
 
 def _check_spring(rig: Rig) -> None:

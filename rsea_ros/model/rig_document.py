@@ -190,12 +190,9 @@ def _expectation(field: Field) -> tuple[str, str]:
     return expects, "infinite" if math.isinf(field.default) else f"{field.default:g}"
 
 
-_LATEST = 0.01
-"""s. A clock further off than this is no clock error but a delay of the bench."""
-_OLDEST = 0.2
-"""s. A reading that is older than this, no controller and no fit can use."""
-_FASTEST = 1000.0
-"""ppm. A clock that runs faster than this counts in other units."""
+_LIMITS = {"clock": 0.01, "clock_rate": 1000.0, "delay": 0.2}
+"""s, ppm, s. A clock further off is no clock error but a delay of the bench, a faster one counts in other
+units, and an older reading no controller and no fit can use."""
 
 
 def sensors_from(body: Mapping[str, Any]) -> dict[str, Sensor]:
@@ -214,45 +211,33 @@ def sensors_from(body: Mapping[str, Any]) -> dict[str, Sensor]:
                 f"sensors.{name} = {noise:g}, {quantum:g} {plain(UNITS[name])}, expected finite values >= 0",
                 f"sensors.{name}",
             )
-        floating, clock = switch(fields, f"sensors.{name}.zero_unknown"), _clock(fields, name)
-        late = _clock_rate(fields, name), _delay(fields, name)
-        sensors[name] = Sensor(noise, quantum, floating, *clock, *late)
+        floating = switch(fields, f"sensors.{name}.zero_unknown")
+        clock, rate = _small(fields, name, "clock", "s"), _small(fields, name, "clock_rate", "ppm")
+        if (age := _small(fields, name, "delay", "s")) < 0.0:
+            stated, field = f"= {age:g} s, expected 0 or more", f"sensors.{name}.delay"
+            raise RigError(f"{field}.value {stated}: a reading is no younger", field)
+        sensors[name] = Sensor(noise, quantum, floating, clock, _clock_doubt(fields, name), rate, age)
     return sensors
 
 
-def _clock(fields: Mapping[str, Any], name: str) -> tuple[float, float]:
-    """Return value and doubt, s, from `clock: {value: …, unit: s, doubt: …}`; 0 where there is none."""
+def _clock_doubt(fields: Mapping[str, Any], name: str) -> float:
+    """Return the doubt of `clock: {value: …, unit: s, doubt: …}`, s."""
     field = f"sensors.{name}.clock"
-    item = mapping(fields.get("clock", {"value": 0.0, "unit": "s"}), field)
-    only_keys(item, names(CLOCK), field)
-    value = _small(item, field, "s", _LATEST)
-    doubt = number(item.get("doubt", CLOCK_DOUBT), f"{field}.doubt", "s")
-    if not 0.0 < doubt < _LATEST:
-        raise RigError(f"{field}.doubt = {doubt:g} s, expected more than 0, less than {_LATEST:g} s", field)
-    return value, doubt
+    doubt = number(fields.get("clock", {}).get("doubt", CLOCK_DOUBT), f"{field}.doubt", "s")
+    if not 0.0 < doubt < _LIMITS["clock"]:
+        limits = f"more than 0, less than {_LIMITS['clock']:g} s"
+        raise RigError(f"{field}.doubt = {doubt:g} s, expected {limits}", field)
+    return doubt
 
 
-def _clock_rate(fields: Mapping[str, Any], name: str) -> float:
-    """Return ppm from `clock_rate: {value: …, unit: ppm}`; 0 where there is none."""
-    field = f"sensors.{name}.clock_rate"
-    item = mapping(fields.get("clock_rate", {"value": 0.0, "unit": "ppm"}), field)
-    only_keys(item, names(CLOCK_RATE), field)
-    return _small(item, field, "ppm", _FASTEST)
+def _small(fields: Mapping[str, Any], name: str, key: str, unit_name: str) -> float:
+    """Return the value of `key: {value: …, unit: …}` of a sensor, 0 where there is none.
 
-
-def _delay(fields: Mapping[str, Any], name: str) -> float:
-    """Return s from `delay: {value: …, unit: s}`; 0 where there is none."""
-    field = f"sensors.{name}.delay"
-    item = mapping(fields.get("delay", {"value": 0.0, "unit": "s"}), field)
-    only_keys(item, names(CLOCK_RATE), field)
-    value = _small(item, field, "s", _OLDEST)
-    if value < 0.0:
-        raise RigError(f"{field}.value = {value:g} s, expected 0 or more: a reading is no younger", field)
-    return value
-
-
-def _small(item: Mapping[str, Any], field: str, unit_name: str, limit: float) -> float:
-    """Return the value of `{value: …, unit: …}`. Raises RigError where it is not within the limit."""
+    Raises RigError where it is not within its limit.
+    """
+    field, limit = f"sensors.{name}.{key}", _LIMITS[key]
+    item = mapping(fields.get(key, {"value": 0.0, "unit": unit_name}), field)
+    only_keys(item, names(CLOCK if key == "clock" else CLOCK_RATE), field)
     unit(item.get("unit"), f"{field}.unit", unit_name)
     value = number(item.get("value"), f"{field}.value", unit_name)
     if not abs(value) < limit:

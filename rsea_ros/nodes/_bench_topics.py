@@ -8,8 +8,7 @@ from typing import Any
 from rclpy.node import Node
 from rclpy.serialization import serialize_message
 
-from msg_adapters.cdr import VALUES
-from msg_adapters.raw import RawWriter
+from msg_adapters.cdr import VALUES, RawWriter
 from msg_adapters.ros import (
     JointState,
     WrenchStamped,

@@ -16,7 +16,7 @@ from rclpy.node import Node
 from rclpy.parameter_client import AsyncParameterClient
 from rclpy.serialization import serialize_message
 
-from msg_adapters.raw import RawWriter
+from msg_adapters.cdr import RawWriter
 from msg_adapters.ros import Bool, DiagnosticArray, JointState, torque_command_message
 from msg_adapters.topic_map import JOINT_STATE, WRENCH, sign_and_index
 from rsea_ros.model.rig import END_NAMES, Rig

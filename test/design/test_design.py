@@ -167,3 +167,12 @@ def test_bad_catalogues_are_refused(tmp_path, text, message):
 def test_impossible_requirements_are_refused(change, message):
     with pytest.raises(ParameterError, match=message):
         replace(PAPER, **change)
+
+
+@pytest.mark.parametrize(
+    ("change", "demand"),
+    [({"torque": 9e5}, "Deflection"), ({"inertia": 1e5}, "Eq. \\(7\\)"), ({"bandwidth": 9e5}, "spin")],
+)
+def test_a_demand_that_no_spring_meets_is_named_and_not_the_stiffness(change, demand):
+    with pytest.raises(ParameterError, match=f"demand .*{demand}. asks for a spring of"):
+        least_stiffness(replace(PAPER, **change), UNIT)
