@@ -20,9 +20,8 @@ if TYPE_CHECKING:
     from rsea_ros.control.following import closed_loop
     from rsea_ros.diagnosis.settings import DiagnosisSettings
     from rsea_ros.errors import RseaError
-    from rsea_ros.library.diagnosed import diagnose
-    from rsea_ros.library.identified import identify
     from rsea_ros.library.records import check, read_bag, simulate
+    from rsea_ros.library.results import diagnose, identify
     from rsea_ros.library.studies import design, experiment, law, save
     from rsea_ros.model.observer.observer import Observer, observe
     from rsea_ros.model.prediction_errors import predict
@@ -41,10 +40,10 @@ DOOR = {
     "check": "library.records",
     "closed_loop": "control.following",
     "design": "library.studies",
-    "diagnose": "library.diagnosed",
+    "diagnose": "library.results",
     "effects": "effects",
     "experiment": "library.studies",
-    "identify": "library.identified",
+    "identify": "library.results",
     "law": "library.studies",
     "load_rig": "model.rig_file",
     "observe": "model.observer.observer",

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 from rsea_ros.design.motor_gear_units import PAPERS, unit_named
 from rsea_ros.documents.wording import did_you_mean, quote
 from rsea_ros.errors import ParameterError, check_kind, check_number, check_rate
-from rsea_ros.library.diagnosed import Diagnosed
-from rsea_ros.library.identified import Fit
+from rsea_ros.library.results import Diagnosed, Fit
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig, save_rig
 from rsea_ros.progress import Progress
