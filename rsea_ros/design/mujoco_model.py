@@ -98,11 +98,6 @@ _LENGTH = {"housing_end": 0.4, "spring_end": -0.4}
 """m, of the drawn links: thigh up, shank down."""
 
 
-def mjcf(rig: Rig) -> str:
-    """Return the model. Raises RigError for a rig that is lumped, has a rigid spring or a massless part."""
-    return text(model_element(rig))
-
-
 def text(root: xml.Element) -> str:
     """Return a model as the text of its file."""
     xml.indent(root)
@@ -110,7 +105,10 @@ def text(root: xml.Element) -> str:
 
 
 def model_element(rig: Rig, play: float = 0.0) -> xml.Element:
-    """Return the model as XML. play: whole width between gear output and chassis, rad. Raises as `mjcf`."""
+    """Return the model as XML. play: whole width between gear output and chassis, rad.
+
+    Raises RigError for a rig that is lumped, has a rigid spring or a massless part.
+    """
     if rig.rigid_spring:
         raise RigError(f"rig {rig.name}: a rigid spring cannot be exported, expected a spring")
     mesh = mesh_of(rig)

@@ -27,7 +27,6 @@ from rsea_ros.model.transfer import (
     undamped_band,
 )
 from rsea_ros.paper import formulas
-from rsea_ros.paper.formulas import eq_6_distal_per_proximal
 from rsea_ros.records.record import ComplexArray, FloatArray
 
 TOLERANCES = ((3.0, 90.0), (1.0, 90.0), (3.0, 10.0), (1.0, 5.0))
@@ -55,8 +54,8 @@ def bands(rig: Rig, motor_torque: float) -> Bands:
     """Return the bands of a rig. motor_torque: N m."""
     k_s, j_sc, b_s = (rig[n] for n in ("spring.stiffness", "chassis.inertia", "spring.damping"))
     functions = {
-        "Eq. (6) undamped, element": eq_6_distal_per_proximal(k_s, j_sc, 0.0),
-        "Eq. (6) with b_s, element": eq_6_distal_per_proximal(k_s, j_sc, b_s),
+        "Eq. (6) undamped, element": formulas.eq_6_distal_per_proximal(k_s, j_sc, 0.0),
+        "Eq. (6) with b_s, element": formulas.eq_6_distal_per_proximal(k_s, j_sc, b_s),
         "With the rotor's spin, element": end_to_end(rig, "element"),
         "With the rotor's spin, sensor sees K_s + b_s s": end_to_end(rig),
     }
