@@ -27,22 +27,7 @@ from rsea_ros.documents.units import plain
 from rsea_ros.documents.wording import quote
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.errors import FieldError, RigError, RseaError
-from rsea_ros.model.rig import (
-    CLOCK_DOUBT,
-    END_NAMES,
-    FIELDS,
-    HOLDS,
-    LOOP_FIELDS,
-    LOOP_LIMITS,
-    EffectSetting,
-    Field,
-    Hold,
-    PositionLoop,
-    Quantity,
-    Rig,
-    Sensor,
-    check_value,
-)
+from rsea_ros.model import rig as rigs
 from rsea_ros.model.train import TRAINS
 from rsea_ros.records.record import MEASURED, UNITS
 
@@ -67,20 +52,20 @@ _MEANINGS = {
     "proximal_spring.damping": "damping of that spring",
     **{
         f"{end}.{key}": meaning
-        for end in END_NAMES
+        for end in rigs.END_NAMES
         for key, meaning in _END.items()
     },
     "spring_end.above_sensor": "share of its inertia between the spring and the F/T sensor",
 }  # fmt: skip
 _TRAINS = ", ".join(f"`{train}`" for train in TRAINS)
-GROUPS = sorted({name.split(".")[0] for name in FIELDS} - {"controller"})
+GROUPS = sorted({name.split(".")[0] for name in rigs.FIELDS} - {"controller"})
 SWITCHES: Mapping[str, Sequence[Key]] = {
     "gear": (
         Key("train", _TRAINS, "planetary", "kind of gear train, and the part that is held"),
         Key("or", "list of trains", "none", "other possible kinds"),
     ),
     "spring": (Key("rigid", "true or false", "false", "there is no spring"),),
-    **{end: (Key("clamped", "true or false", "false", "this end cannot move"),) for end in END_NAMES},
+    **{end: (Key("clamped", "true or false", "false", "this end cannot move"),) for end in rigs.END_NAMES},
 }  # fmt: skip
 TOP = (
     Key("name", "text", "name of the file", "name of the rig"),
@@ -122,10 +107,10 @@ SENSOR = (
 CLOCK = (
     Key("value", "number", NEEDED),
     Key("unit", "s", NEEDED),
-    Key("doubt", "s, > 0, below 0.01 s", f"{CLOCK_DOUBT:g} s", "one sigma of `value`"),
+    Key("doubt", "s, > 0, below 0.01 s", f"{rigs.CLOCK_DOUBT:g} s", "one sigma of `value`"),
 )
 CLOCK_RATE = (Key("value", "number", NEEDED), Key("unit", "ppm", NEEDED))
-LOOP_KIND = Key("kind", ", ".join(f"`{k}`" for k in LOOP_FIELDS), NEEDED, "kind of the position loop")
+LOOP_KIND = Key("kind", ", ".join(f"`{k}`" for k in rigs.LOOP_FIELDS), NEEDED, "kind of the position loop")
 _LOOP_MEANINGS = {
     "k_p": "torque per error: u = k_p e + k_i int e dt - k_d dq/dt + k_f dr/dt",
     "k_i": "torque per integral of the error",
@@ -156,32 +141,32 @@ def tables() -> str:
     """Return the tables of docs/rig.md in Markdown."""
     parts = [table("rig", TOP)]
     for group in GROUPS:
-        fields = [(name, field) for name, field in FIELDS.items() if name.startswith(f"{group}.")]
+        fields = [(name, field) for name, field in rigs.FIELDS.items() if name.startswith(f"{group}.")]
         parts.append(table(group, [*(_key(name, field) for name, field in fields), *SWITCHES.get(group, ())]))
     parts.append(table("sensors.CHANNEL", SENSOR))
     channels = ", ".join(f"`{n}` {plain(u)}" for n, u in UNITS.items())
     parts.append(f"Channels and their units: {channels}.\n")
     parts += [table("sensors.CHANNEL.clock", CLOCK)]
-    parts += [_loop_table(kind) for kind in LOOP_FIELDS]
+    parts += [_loop_table(kind) for kind in rigs.LOOP_FIELDS]
     parts += [table("controller", CONTROLLER), table("effects[i]", EFFECT), table("GROUP.FIELD", QUANTITY)]
     return "\n".join(parts)
 
 
 def _loop_table(kind: str) -> str:
     """Return the table of a position loop whose targets command the bench."""
-    keys = [(key, FIELDS[f"controller.{key}"]) for key in (*LOOP_FIELDS[kind], *LOOP_LIMITS)]
+    keys = [(key, rigs.FIELDS[f"controller.{key}"]) for key in (*rigs.LOOP_FIELDS[kind], *rigs.LOOP_LIMITS)]
     rows = [Key(key, *_expectation(field), _LOOP_MEANINGS[key]) for key, field in keys]
     return table(f"controller, kind: {kind}", [LOOP_KIND, *rows])
 
 
-def _key(name: str, field: Field) -> Key:
+def _key(name: str, field: rigs.Field) -> Key:
     expects, default = _expectation(field)
     if name.endswith("_end.inertia"):
         default = "required unless clamped"
     return Key(name.split(".")[1], expects, default, _MEANINGS[name])
 
 
-def _expectation(field: Field) -> tuple[str, str]:
+def _expectation(field: rigs.Field) -> tuple[str, str]:
     """Return the expected value of a field, and its default."""
     bound = f", {'>=' if field.low_allowed else '>'} {field.low:g}" if math.isfinite(field.low) else ""
     expects = f"{plain(field.unit) or 1}{bound}"
@@ -195,7 +180,7 @@ _LIMITS = {"clock": 0.01, "clock_rate": 1000.0, "delay": 0.2}
 units, and an older reading no controller and no fit can use."""
 
 
-def sensors_from(body: Mapping[str, Any]) -> dict[str, Sensor]:
+def sensors_from(body: Mapping[str, Any]) -> dict[str, rigs.Sensor]:
     """Return the sensors by channel, from the file's `sensors`."""
     only_keys(body, set(MEASURED), "sensors")
     sensors = {}
@@ -216,14 +201,14 @@ def sensors_from(body: Mapping[str, Any]) -> dict[str, Sensor]:
         if (age := _small(fields, name, "delay", "s")) < 0.0:
             stated, field = f"= {age:g} s, expected 0 or more", f"sensors.{name}.delay"
             raise RigError(f"{field}.value {stated}: a reading is no younger", field)
-        sensors[name] = Sensor(noise, quantum, floating, clock, _clock_doubt(fields, name), rate, age)
+        sensors[name] = rigs.Sensor(noise, quantum, floating, clock, _clock_doubt(fields, name), rate, age)
     return sensors
 
 
 def _clock_doubt(fields: Mapping[str, Any], name: str) -> float:
     """Return the doubt of `clock: {value: …, unit: s, doubt: …}`, s."""
     field = f"sensors.{name}.clock"
-    doubt = number(fields.get("clock", {}).get("doubt", CLOCK_DOUBT), f"{field}.doubt", "s")
+    doubt = number(fields.get("clock", {}).get("doubt", rigs.CLOCK_DOUBT), f"{field}.doubt", "s")
     if not 0.0 < doubt < _LIMITS["clock"]:
         limits = f"more than 0, less than {_LIMITS['clock']:g} s"
         raise RigError(f"{field}.doubt = {doubt:g} s, expected {limits}", field)
@@ -246,7 +231,7 @@ def _small(fields: Mapping[str, Any], name: str, key: str, unit_name: str) -> fl
     return value
 
 
-def check_effects(settings: Sequence[EffectSetting]) -> None:
+def check_effects(settings: Sequence[rigs.EffectSetting]) -> None:
     """Raise FieldError for an effect that is unknown or listed twice, and for a value out of bounds."""
     for i, setting in enumerate(settings):
         if setting.name in (earlier.name for earlier in settings[:i]):
@@ -257,7 +242,7 @@ def check_effects(settings: Sequence[EffectSetting]) -> None:
             raise FieldError(str(error), f"effects[{i}].parameters") from None
 
 
-def rig_from_document(document: Mapping[str, Any], default_name: str = "rig") -> Rig:
+def rig_from_document(document: Mapping[str, Any], default_name: str = "rig") -> rigs.Rig:
     """Build a rig from the parsed YAML. Raises RigError naming the field."""
     try:
         return _rig(document, default_name)
@@ -265,15 +250,15 @@ def rig_from_document(document: Mapping[str, Any], default_name: str = "rig") ->
         raise RigError(str(error), error.field) from None
 
 
-def _rig(document: Mapping[str, Any], default_name: str) -> Rig:
+def _rig(document: Mapping[str, Any], default_name: str) -> rigs.Rig:
     only_keys(document, names(TOP), "rig")
     groups = {g: mapping(document.get(g, {}), g) for g in GROUPS}
     quantities = {name: q for g, body in groups.items() for name, q in _quantities(g, body)}
     loop, gains = _loop(document.get("controller"))
     quantities |= gains
-    clamped = frozenset(end for end in END_NAMES if switch(groups[end], f"{end}.clamped"))
+    clamped = frozenset(end for end in rigs.END_NAMES if switch(groups[end], f"{end}.clamped"))
     effects = _effects(document.get("effects", []))
-    return Rig(
+    return rigs.Rig(
         name=text(document.get("name", default_name), "name"),
         about=text(document.get("about", ""), "about"),
         source=text(document.get("source", ""), "source"),
@@ -298,9 +283,9 @@ def _rig(document: Mapping[str, Any], default_name: str) -> Rig:
     )
 
 
-def _quantities(group: str, body: Mapping[str, Any]) -> list[tuple[str, Quantity]]:
+def _quantities(group: str, body: Mapping[str, Any]) -> list[tuple[str, rigs.Quantity]]:
     switches = names(SWITCHES.get(group, ()))
-    allowed = {name.split(".")[1] for name in FIELDS if name.startswith(group + ".")}
+    allowed = {name.split(".")[1] for name in rigs.FIELDS if name.startswith(group + ".")}
     only_keys(body, allowed | switches, group)
     return [
         (f"{group}.{key}", _quantity(f"{group}.{key}", item))
@@ -309,15 +294,15 @@ def _quantities(group: str, body: Mapping[str, Any]) -> list[tuple[str, Quantity
     ]
 
 
-def _quantity(name: str, item: Any) -> Quantity:
-    field: Field = FIELDS[name]
+def _quantity(name: str, item: Any) -> rigs.Quantity:
+    field: rigs.Field = rigs.FIELDS[name]
     body = mapping(item, name, expected=f"{{value: …, unit: {field.unit}}}")
     only_keys(body, names(QUANTITY), name)
     unit(body.get("unit"), f"{name}.unit", field.unit)
     value = number(body.get("value"), name, field.unit)
-    check_value(name, value, where="value")
+    rigs.check_value(name, value, where="value")
     ci95 = interval(body["ci95"], f"{name}.ci95", field.unit) if "ci95" in body else None
-    return Quantity(value, spread(body, name), text(body.get("source", ""), f"{name}.source"), ci95)
+    return rigs.Quantity(value, spread(body, name), text(body.get("source", ""), f"{name}.source"), ci95)
 
 
 def _known_names(items: Any, stated: Collection[str]) -> frozenset[str]:
@@ -330,28 +315,27 @@ def _known_names(items: Any, stated: Collection[str]) -> frozenset[str]:
     return frozenset(items)
 
 
-def _loop(item: Any) -> tuple[str | None, dict[str, Quantity]]:
+def _loop(item: Any) -> tuple[str | None, dict[str, rigs.Quantity]]:
     """Return the kind of a position loop whose targets command the bench, and its gains and limits."""
     if not isinstance(item, Mapping) or "kind" not in item:
         return None, {}
     kind = text(item["kind"], "controller.kind")
-    if kind not in LOOP_FIELDS:
-        raise RigError(
-            f"controller.kind = {quote(kind)}, expected one of {', '.join(LOOP_FIELDS)}", "controller.kind"
-        )
-    only_keys(item, {"kind", *LOOP_FIELDS[kind], *LOOP_LIMITS}, "controller")
+    if kind not in rigs.LOOP_FIELDS:
+        known = ", ".join(rigs.LOOP_FIELDS)
+        raise RigError(f"controller.kind = {quote(kind)}, expected one of {known}", "controller.kind")
+    only_keys(item, {"kind", *rigs.LOOP_FIELDS[kind], *rigs.LOOP_LIMITS}, "controller")
     names_of = (key for key in item if key != "kind")
     return kind, {f"controller.{key}": _quantity(f"controller.{key}", item[key]) for key in names_of}
 
 
-def _hold(item: Any) -> Hold:
-    for hold in HOLDS:
+def _hold(item: Any) -> rigs.Hold:
+    for hold in rigs.HOLDS:
         if item == hold:
             return hold
-    raise RigError(f"hold = {quote(item)}, expected {', '.join(HOLDS)}", "hold")
+    raise RigError(f"hold = {quote(item)}, expected {', '.join(rigs.HOLDS)}", "hold")
 
 
-def _controller(item: Any) -> PositionLoop | None:
+def _controller(item: Any) -> rigs.PositionLoop | None:
     if item is None:
         return None
     body = mapping(item, "controller")
@@ -365,10 +349,10 @@ def _controller(item: Any) -> PositionLoop | None:
             raise RigError(f"{name} = {stated}, expected a finite value >= {least}", name)
     if limit <= 0.0:
         raise RigError(f"controller.limit = {limit:g} N·m, expected a value > 0 N·m", "controller.limit")
-    return PositionLoop(k_p, k_v, limit)
+    return rigs.PositionLoop(k_p, k_v, limit)
 
 
-def _effects(items: Any) -> tuple[EffectSetting, ...]:
+def _effects(items: Any) -> tuple[rigs.EffectSetting, ...]:
     settings = []
     for i, item in enumerate(sequence(items, "effects", "{name: …, parameters: {…}}")):
         body = mapping(item, f"effects[{i}]")
@@ -376,6 +360,6 @@ def _effects(items: Any) -> tuple[EffectSetting, ...]:
         parameters = mapping(body.get("parameters", {}), f"effects[{i}].parameters")
         values = {k: number(v, f"effects[{i}].{k}", "SI") for k, v in parameters.items()}
         name = text(body.get("name", ""), f"effects[{i}].name")
-        settings.append(EffectSetting(name, values, switch(body, f"effects[{i}].guess")))
+        settings.append(rigs.EffectSetting(name, values, switch(body, f"effects[{i}].guess")))
     check_effects(settings)
     return tuple(settings)

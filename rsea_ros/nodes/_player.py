@@ -13,13 +13,7 @@ import numpy as np
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 
-from msg_adapters.ros import (
-    ERROR,
-    DiagnosticArray,
-    JointState,
-    stamp_of,
-    torque_command_message,
-)
+from msg_adapters import ros
 from rsea_ros.errors import DeviceError, RseaError
 from rsea_ros.experiment.joint_weighing import SHORTEST
 from rsea_ros.nodes._cycle import SECOND, Cycle
@@ -52,15 +46,16 @@ class Player:
         wanted: int,
         joint: str,
         ready: Callable[[], bool] = lambda: True,
-        publisher: Publisher[JointState] | None = None,
+        publisher: Publisher[ros.JointState] | None = None,
     ) -> None:
         self.command, self.rate = command, rate
         self.next, self.left_out, self.started = 0, 0, False
         self._node, self._lead, self._wanted, self._joint = node, round(lead * SECOND), wanted, joint
         self._stamp, self._last, self._ready = 0, 0.0, ready
         self._stopped_at = -1
-        self._publisher = publisher or node.create_publisher(JointState, "torque_command", COMMAND)
-        self._measurements = node.create_subscription(JointState, "joint_states", self._begin, MEASUREMENT)
+        self._publisher = publisher or node.create_publisher(ros.JointState, "torque_command", COMMAND)
+        states = ros.JointState, "joint_states", self._begin, MEASUREMENT
+        self._measurements = node.create_subscription(*states)
         self.cycle = Cycle(rate, self._step, catch_up=True)
 
     @property
@@ -94,7 +89,7 @@ class Player:
         last = max(self._stamp, time.time_ns())
         for k in range(1, CLOSING_ZEROS + 1 if self.started else 1):
             stamp = last + round(k * SECOND / self.rate)
-            self._publisher.publish(torque_command_message(stamp, 0.0, self._joint))
+            self._publisher.publish(ros.torque_command_message(stamp, 0.0, self._joint))
         await_arrival(self._publisher)
 
     def _end_softly(self) -> None:
@@ -105,12 +100,12 @@ class Player:
         while self.started and self.cycle.error is None and time.monotonic() < deadline and not self.over():
             time.sleep(0.005)
 
-    def _begin(self, message: JointState) -> None:
+    def _begin(self, message: ros.JointState) -> None:
         """Start at a whole number of periods after a measurement, once all subscribers listen."""
         if self.started or self.stopped or self.subscriptions < self._wanted or not self._ready():
             return
         self.started = True
-        self.cycle.start(self._first(stamp_of(message.header.stamp)) - self._lead)
+        self.cycle.start(self._first(ros.stamp_of(message.header.stamp)) - self._lead)
         self._node.destroy_subscription(self._measurements)
 
     def _first(self, measured: int) -> int:
@@ -127,7 +122,7 @@ class Player:
         if self._lead and self._stamp - time.time_ns() < min(MARGIN, self._lead // 2):
             self.left_out += 1
         else:
-            self._publisher.publish(torque_command_message(self._stamp, torque, self._joint))
+            self._publisher.publish(ros.torque_command_message(self._stamp, torque, self._joint))
 
     def _torque(self, k: int) -> float:
         """Return the command of cycle k: as planned; after a stop the last one, decreasing to zero."""
@@ -156,7 +151,7 @@ class BenchEars:
         self.last = time.monotonic()
         self._failed: set[str] = set()
         self._ears = Ears(node, axis, {"torque_command"}, self._heard)
-        self._health = node.create_subscription(DiagnosticArray, "/diagnostics", self._on_health, COMMAND)
+        self._health = node.create_subscription(ros.DiagnosticArray, "/diagnostics", self._on_health, COMMAND)
 
     def begin(self, alarm: Callable[[str], None]) -> None:
         """Start a new record. alarm: called when a node of the bench has failed."""
@@ -175,10 +170,10 @@ class BenchEars:
         if role != "torque_command":
             self.last = time.monotonic()
 
-    def _on_health(self, message: DiagnosticArray) -> None:
+    def _on_health(self, message: ros.DiagnosticArray) -> None:
         """Raise the alarm for failures after the beginning of the run only."""
         for status in message.status:
-            if status.level != ERROR:
+            if status.level != ros.ERROR:
                 self._failed.discard(status.name)
             elif status.name not in self._failed:
                 self._failed.add(status.name)

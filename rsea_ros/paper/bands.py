@@ -15,17 +15,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rsea_ros.design.spring_design import band_range
+from rsea_ros.model import transfer
 from rsea_ros.model.equations import rotor_inertia, train_ratio
 from rsea_ros.model.rig import END_NAMES, Rig
 from rsea_ros.model.train import TRAINS, Train
-from rsea_ros.model.transfer import (
-    end_response,
-    end_to_end,
-    flat_band,
-    inner_inertia,
-    pure_torque_bandwidth,
-    undamped_band,
-)
 from rsea_ros.paper import formulas
 from rsea_ros.records.record import ComplexArray, FloatArray
 
@@ -56,16 +49,16 @@ def bands(rig: Rig, motor_torque: float) -> Bands:
     functions = {
         "Eq. (6) undamped, element": formulas.eq_6_distal_per_proximal(k_s, j_sc, 0.0),
         "Eq. (6) with b_s, element": formulas.eq_6_distal_per_proximal(k_s, j_sc, b_s),
-        "With the rotor's spin, element": end_to_end(rig, "element"),
-        "With the rotor's spin, sensor sees K_s + b_s s": end_to_end(rig),
+        "With the rotor's spin, element": transfer.end_to_end(rig, "element"),
+        "With the rotor's spin, sensor sees K_s + b_s s": transfer.end_to_end(rig),
     }
-    inner, spread = inner_inertia(rig), rig.spread("rotor.reflected_inertia")
-    edge = float(undamped_band(k_s, inner))
+    inner, spread = transfer.inner_inertia(rig), rig.spread("rotor.reflected_inertia")
+    edge = float(transfer.undamped_band(k_s, inner))
     return Bands(
-        eq_7=pure_torque_bandwidth(k_s, j_sc),
+        eq_7=transfer.pure_torque_bandwidth(k_s, j_sc),
         eq_7_spin=edge,
         spin_range=band_range(k_s, j_sc, inner - j_sc, spread),
-        rows={n: tuple(flat_band(f, *t) for t in TOLERANCES) for n, f in functions.items()},
+        rows={n: tuple(transfer.flat_band(f, *t) for t in TOLERANCES) for n, f in functions.items()},
         spring_limit=0.5 * k_s * math.sin(2.0 * math.radians(5.0)),
         motor_limit={f: motor_torque * _gain(rig, f) for f in (1.0, 5.0, 10.0, edge)},
     )
@@ -73,7 +66,7 @@ def bands(rig: Rig, motor_torque: float) -> Bands:
 
 def _gain(rig: Rig, hz: float) -> float:
     clamped = replace(rig, clamped=frozenset(END_NAMES))
-    return float(abs(end_response(clamped, np.array([hz]))[0]))
+    return float(abs(transfer.end_response(clamped, np.array([hz]))[0]))
 
 
 HZ: FloatArray = np.geomspace(0.5, 140.0, 60)
@@ -104,7 +97,8 @@ def arrangements(rig: Rig) -> tuple[Arrangement, ...]:
     turned = [replace(rig, train=train) for train in TRAINS]
     outer = [r["chassis.inertia"] + train_ratio(r) ** 2 * rotor_inertia(r) for r in turned]
     return tuple(
-        Arrangement(r.train, train_ratio(r), j, inner_inertia(r)) for r, j in zip(turned, outer, strict=True)
+        Arrangement(r.train, train_ratio(r), j, transfer.inner_inertia(r))
+        for r, j in zip(turned, outer, strict=True)
     )
 
 
@@ -133,7 +127,7 @@ def _limit(what: str, of: str, values: Sequence[float], error: Callable[[float],
 
 
 def _off(rig: Rig, other: Rig) -> float:
-    return _worst(end_response(rig, HZ), end_response(other, HZ))
+    return _worst(transfer.end_response(rig, HZ), transfer.end_response(other, HZ))
 
 
 def _off_eq_5(rig: Rig) -> float:
@@ -142,11 +136,11 @@ def _off_eq_5(rig: Rig) -> float:
     eq_5 = formulas.eq_5_proximal_per_motor(
         rig["spring.stiffness"], *rotor, ratio, rig["chassis.inertia"], rig["spring.damping"]
     )
-    return _worst(end_response(rig, HZ, "housing_end"), eq_5(2j * np.pi * HZ))
+    return _worst(transfer.end_response(rig, HZ, "housing_end"), eq_5(2j * np.pi * HZ))
 
 
 def _end_to_end_off(rig: Rig) -> float:
-    both = end_response(rig, HZ) / end_response(rig, HZ, "housing_end")
+    both = transfer.end_response(rig, HZ) / transfer.end_response(rig, HZ, "housing_end")
     return _worst(both, np.ones(len(HZ), complex))
 
 

@@ -16,17 +16,7 @@ from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.model import outputs
 from rsea_ros.model.drive import LONGEST_STEP
 from rsea_ros.model.equations import PORTS, with_structure
-from rsea_ros.model.observer.filter import (
-    BRIEF,
-    CLOCK,
-    FIXED,
-    SIGMA,
-    WALK,
-    WINDOWS,
-    FilterModel,
-    FilterState,
-    disturbance,
-)
+from rsea_ros.model.observer import filter as kf
 from rsea_ros.model.observer.signal_noise import Noise
 from rsea_ros.model.propagator import state_space
 from rsea_ros.model.rig import Rig
@@ -93,7 +83,7 @@ def without_delay(rig: Rig) -> tuple[Rig, float]:
 
 def assemble(
     rig: Rig, noise: Noise, *, hold: float, duration: float, learns: bool
-) -> tuple[FilterModel, FilterState]:
+) -> tuple[kf.FilterModel, kf.FilterState]:
     """Return the model and the state at rest with nothing known. hold, duration: s; learns: filter.py."""
     machine, linear = build(rig, LONGEST_STEP, duration), linear_model(with_structure(rig))
     n, size = linear.order, len(linear.start)
@@ -105,7 +95,7 @@ def assemble(
     walk = np.zeros((size, size))
     walk[n, n] = noise.walk / scale[n] ** 2
     estimated = linear.estimated
-    model = FilterModel(
+    model = kf.FilterModel(
         linear=machine.linear._replace(phi=np.eye(n), g=np.zeros((n, len(PORTS)))),
         calls=_with_disturbance(machine.calls),
         block=block, block_scale=block_scale, a=a, walk=walk, scale=scale,
@@ -117,7 +107,7 @@ def assemble(
     state = _state(n, size, machine)
     state.p[:] = np.diag(linear.start**2)
     state.p[n, n] = noise.disturbance**2
-    state.learnt[FIXED] = not learns
+    state.learnt[kf.FIXED] = not learns
     return model, state
 
 
@@ -140,7 +130,7 @@ def _with_disturbance(calls: Calls) -> Calls:
     first[_GEAR + 1 :] += 1
     return Calls(
         first=first,
-        address=np.insert(calls.address, at, disturbance.address),
+        address=np.insert(calls.address, at, kf.disturbance.address),
         p_at=np.insert(calls.p_at + 1, at, 0),
         x_at=np.insert(calls.x_at, at, 0),
         p=np.concatenate([[0.0], calls.p]),
@@ -148,13 +138,14 @@ def _with_disturbance(calls: Calls) -> Calls:
     )
 
 
-def _state(n: int, size: int, machine: Machine) -> FilterState:
+def _state(n: int, size: int, machine: Machine) -> kf.FilterState:
     """Return a state of zeros, all its parts views of one array."""
     states = len(machine.effect_x)
-    sizes = (n, size - n, size * size, st.SIZE, states, n, 3, SIGMA + 3, CLOCK, 9, BRIEF + len(WINDOWS))
+    learnt, brief = kf.SIGMA + 3, kf.BRIEF + len(kf.WINDOWS)
+    sizes = (n, size - n, size * size, st.SIZE, states, n, 3, learnt, kf.CLOCK, 9, brief)
     whole = np.zeros(sum(sizes))
     parts = np.split(whole, np.cumsum(sizes)[:-1])
-    state = FilterState(whole, *parts)
+    state = kf.FilterState(whole, *parts)
     state.table[:] = machine.table
-    state.learnt[WALK] = 1.0
+    state.learnt[kf.WALK] = 1.0
     return state._replace(p=state.p.reshape(size, size))
