@@ -2,22 +2,20 @@
 
 import json
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from rclpy.node import Node
 
-from msg_adapters.topic_map import JOINT_STATE, WRENCH, sign_and_index
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.extent import LARGEST
 from rsea_ros.model.observer import Noise, noise_of
-from rsea_ros.model.observer.log import COMMAND, FT, STATE
+from rsea_ros.model.observer.log import COMMAND
 from rsea_ros.model.rig import Rig
-from rsea_ros.nodes._commands import HORIZON
 from rsea_ros.nodes._cycle import SECOND
-from rsea_ros.nodes._mailbox import Mailbox, MessageFields
+from rsea_ros.nodes._mailbox import Event, JointTopics, Keep
 from rsea_ros.nodes._qos import RECORD
 from rsea_ros.records.record import FloatArray, IntArray
 
@@ -26,48 +24,37 @@ LAG = SECOND // 10
 MOST = 10_000
 """Events that wait at most: commands without measurements would wait, and grow, for as long as these stop."""
 Events = tuple[FloatArray, IntArray, FloatArray]
-Keep = Callable[[str, str, int, bytes], None]
+_TOPICS = ("joint_states", "ft", "torque_command")
+"""By kind of the events on them."""
 
 
-class HealthInputs:
-    """Best-effort subscriptions; nothing waits for them. keep: gets topic, type, arrival (ns), bytes."""
+class HealthInputs(JointTopics):
+    """Best-effort subscriptions; nothing waits for them. keep: as of JointTopics."""
 
     def __init__(self, node: Node, axis: str, joint: str, keep: Keep) -> None:
-        self._sign, along = sign_and_index(axis)
+        super().__init__(node, axis, joint, RECORD, RECORD, keep)
         self.epoch: int | None = None
         self._newest = 0
-        self._waiting: list[tuple[int, int, float, float]] = []
-        self.refused = self.unstamped = 0
+        self._waiting: list[Event] = []
         self.counts = {"torque_command": 0, "joint_states": 0, "ft": 0}
-
-        def mailbox(topic: str, kind: str, *fields: tuple[str, int]) -> Mailbox:
-            read = MessageFields(kind, fields, "" if topic == "ft" else joint)
-            box = Mailbox(
-                node, topic, read, RECORD, self._refuse,
-                keep=lambda at, raw: keep(box.subscription.topic_name, kind, at, raw),
-            )  # fmt: skip
-            return box
-
-        self._commands = mailbox("torque_command", JOINT_STATE, ("effort", 0))
-        self._states = mailbox("joint_states", JOINT_STATE, ("position", 0), ("effort", 0))
-        self._fts = mailbox("ft", WRENCH, ("wrench", along))
 
     def take(self) -> Events:
         """Return the complete events: t (s since the first stamp), kind and values of a Look."""
-        states = [(t, STATE, q, u) for t, (q, u), _ in self._states.take()]
-        fts = [(t, FT, self._sign * y, math.nan) for t, (y,), _ in self._fts.take()]
-        commands = [(t, COMMAND, u, math.nan) for t, (u,), _ in self._commands.take()]
-        for name, came in (("torque_command", commands), ("joint_states", states), ("ft", fts)):
-            self.counts[name] += len(came)
-        measured = states + fts
+        came = self.events()
+        for _, kind, *_ in came:
+            self.counts[_TOPICS[kind]] += 1
+        measured = [event for event in came if event[1] != COMMAND]
         if measured:
-            newest = max(row[0] for row in measured)
+            newest = max(event[0] for event in measured)
             if abs(newest - self._newest) > SECOND:
                 self._waiting.clear()
             self._newest = newest
-        self._waiting += measured + [row for row in map(self._place, commands) if row is not None]
-        self._waiting.sort()
-        del self._waiting[:-MOST]
+        for stamp, kind, torque, _ in came:
+            if kind == COMMAND and not math.isfinite(torque):
+                self.refuse()
+            elif kind == COMMAND:
+                measured.append((self.instant(stamp, self._newest), kind, torque, math.nan))
+        self._waiting = sorted(self._waiting + measured)[-MOST:]
         return self._ready()
 
     def _ready(self) -> Events:
@@ -84,20 +71,6 @@ class HealthInputs:
     def stamp(self, t: float) -> int:
         """Return the stamp of an instant, ns since 1970."""
         return (self.epoch or 0) + round(t * SECOND)
-
-    def _place(self, row: tuple[int, int, float, float]) -> tuple[int, int, float, float] | None:
-        """Return a command at the instant from which it counts; None for one that is not a number."""
-        stamp, kind, torque, _ = row
-        if not math.isfinite(torque):
-            self._refuse()
-            return None
-        if stamp == 0 or (self._newest and abs(stamp - self._newest) > HORIZON):
-            self.unstamped += 1
-            stamp = self._newest
-        return stamp, kind, torque, math.nan
-
-    def _refuse(self) -> None:
-        self.refused += 1
 
 
 _EXPECTED = "expected an identification.json of rsea identify"

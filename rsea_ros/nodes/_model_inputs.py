@@ -5,19 +5,17 @@ import time
 from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from operator import itemgetter
 from statistics import median
 
 from rclpy.node import Node
 
-from msg_adapters.topic_map import JOINT_STATE, WRENCH, sign_and_index
 from rsea_ros.model.extent import LARGEST
 from rsea_ros.model.observer import Noise, Observer, TorqueEstimate
+from rsea_ros.model.observer.log import COMMAND, FT
 from rsea_ros.model.rig import Rig
-from rsea_ros.nodes._commands import HORIZON
+from rsea_ros.nodes import _qos
 from rsea_ros.nodes._cycle import SECOND
-from rsea_ros.nodes._mailbox import Mailbox, MessageFields
-from rsea_ros.nodes._qos import COMMAND, MEASUREMENT, RECORD_RELIABLE
+from rsea_ros.nodes._mailbox import Event, JointTopics
 from rsea_ros.records.record import is_measured
 
 SAMPLES, TIME, LONG = 10, 50_000_000, 500_000_000
@@ -126,7 +124,6 @@ def stopped_sensors(rig: Rig, noise: Noise) -> StoppedSensors:
 
 
 PERIODS = 64
-_COMMAND, _STATE, _FT = range(3)
 PATIENCE = 6.0
 """s for which a topic that says nothing is waited for where all topics count in the order of their stamps:
 the middleware repairs after 3 s what a busy machine lost."""
@@ -146,67 +143,51 @@ class InputSettings:
     joint: str = ""
 
 
-class ModelInputs:
+class ModelInputs(JointTopics):
     """Feeds the observer. Stamps are ns; the observer's seconds count from the first one."""
 
     def __init__(
         self, node: Node, observer: Observer, stopped: StoppedSensors, settings: InputSettings
     ) -> None:
+        deep = _qos.RECORD_RELIABLE if settings.reliable else None
+        commands, measured = deep or _qos.COMMAND, deep or _qos.MEASUREMENT
+        super().__init__(node, settings.axis, settings.joint, commands, measured)
         self._observer, self.stopped = observer, stopped
-        self._sign, along = sign_and_index(settings.axis)
         self._timeout = round(settings.ft_timeout * SECOND)
         self._epoch: int | None = None
         self._state_stamp = self._ft_stamp = self._estimate_stamp = 0
         self._periods: deque[float] = deque(maxlen=PERIODS)
-        self.refused = self.unstamped = 0
-        deep = RECORD_RELIABLE if settings.reliable else None
         self._waits = PATIENCE if settings.reliable else 0.0
-        self._waiting: list[tuple[float, tuple[int, int, float, float]]] = []
+        self._waiting: list[tuple[float, Event]] = []
         self._newest = [(0, 0.0)] * 3
-        self._commands, self._states, self.ft = (
-            Mailbox(
-                node,
-                topic,
-                MessageFields(kind, tuple(fields), "" if topic == "ft" else settings.joint),
-                deep or usual,
-                self._refuse,
-            )
-            for kind, topic, usual, *fields in (
-                (JOINT_STATE, "torque_command", COMMAND, ("effort", 0)),
-                (JOINT_STATE, "joint_states", MEASUREMENT, ("position", 0), ("effort", 0)),
-                (WRENCH, "ft", MEASUREMENT, ("wrench", along)),
-            )
-        )
 
     def take(self) -> Iterator[tuple[int, TorqueEstimate]]:
         """Process messages; yield the estimate at each wrench, or at each state while ft is silent."""
         for stamp, kind, a, b in self._due():
-            if kind == _COMMAND:
+            if kind == COMMAND:
                 self._command(stamp, a)
                 continue
             estimate = self._measure(stamp, a, b, kind)
-            if estimate is not None and (kind == _FT or self.ft_silent or self.stopped.ft_frozen):
+            if estimate is not None and (kind == FT or self.ft_silent or self.stopped.ft_frozen):
                 if 0 < stamp - self._estimate_stamp < SECOND:
                     self._periods.append((stamp - self._estimate_stamp) / SECOND)
                 self._estimate_stamp = stamp
                 yield stamp, estimate
 
-    def _due(self) -> list[tuple[int, int, float, float]]:
-        """Return stamp, kind and two numbers of each message whose turn it is, in the order of the stamps.
+    def _due(self) -> list[Event]:
+        """Return the messages whose turn it is, in the order of the stamps, commands first.
 
         Its turn comes when every topic has told what it had before, is silent, or has been waited for.
         """
-        came = [(t, _COMMAND, u, math.nan) for t, (u,), _ in self._commands.take()]
-        came += [(t, _STATE, q, u) for t, (q, u), _ in self._states.take()]
-        came += [(t, _FT, self._sign * y, math.nan) for t, (y,), _ in self.ft.take()]
-        now = time.monotonic()
+        came, now = self.events(), time.monotonic()
         self._waiting += [(now, message) for message in came]
         for stamp, kind, *_ in came:
             self._newest[kind] = stamp, now
         told = [stamp for stamp, heard in self._newest if stamp and now - heard < self._waits]
         late = [message[0] for arrival, message in self._waiting if now - arrival >= self._waits]
         turn = max(min(told, default=0), *late, 0)
-        due = sorted((m for _, m in self._waiting if m[0] <= turn), key=itemgetter(0, 1))
+        ready = (m for _, m in self._waiting if m[0] <= turn)
+        due = sorted(ready, key=lambda m: (m[0], m[1] != COMMAND, m[1]))
         self._waiting = [(arrival, m) for arrival, m in self._waiting if m[0] > turn]
         return due
 
@@ -233,9 +214,9 @@ class ModelInputs:
 
     def _measure(self, stamp: int, a: float, b: float, kind: int) -> TorqueEstimate | None:
         """Give a sample to the observer, unless its sensor has stopped. ft outvotes a state."""
-        if kind == _FT:
+        if kind == FT:
             if not is_measured(a, LARGEST):
-                self._refuse()
+                self.refuse()
                 return None
             self._ft_stamp = stamp
             if self.stopped.take_ft(stamp, a):
@@ -250,15 +231,9 @@ class ModelInputs:
         return self._observer.state(self.seconds(stamp), a, b)
 
     def _command(self, stamp: int, torque: float) -> None:
-        newest = max(self._state_stamp, self._ft_stamp)
-        if stamp == 0 or (newest and abs(stamp - newest) > HORIZON):
-            self.unstamped += 1
-            stamp = newest
+        stamp = self.instant(stamp, max(self._state_stamp, self._ft_stamp))
         if not math.isfinite(torque):
-            self._refuse()
+            self.refuse()
         elif stamp:
             self.stopped.take_command(torque)
             self._observer.command(self.seconds(stamp), torque)
-
-    def _refuse(self) -> None:
-        self.refused += 1
