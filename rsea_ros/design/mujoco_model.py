@@ -67,19 +67,17 @@ class Mesh:
 def mesh_of(rig: Rig) -> Mesh:
     """Return the mesh of a rig's train. Raises RigError for a lumped one, which no mechanism is."""
     ratio = rig["gear.ratio"]
-    match rig.train:
-        case "planetary":
-            return Mesh("output", ("rotor", "housing"), (1.0, ratio - 1.0), internal=False)
-        case "star":
-            return Mesh("housing", ("rotor", "output"), (1.0, ratio - 1.0), internal=False)
-        case "harmonic_circular_spline_held":
-            return Mesh("rotor", ("output", "housing"), (2.0 * ratio, 2.0 * ratio + 2.0), internal=True)
-        case "harmonic_flexspline_held":
-            return Mesh("rotor", ("housing", "output"), (2.0 * ratio, 2.0 * ratio + 2.0), internal=True)
-        case "spur":
-            return Mesh("housing", ("rotor", "output"), (1.0, ratio), internal=False)
-        case _:
-            raise RigError(f"rig {rig.name}: the lumped train cannot be exported, expected a real train")
+    splines, planets = (2.0 * ratio, 2.0 * ratio + 2.0), (1.0, ratio - 1.0)
+    meshes = {
+        "planetary": Mesh("output", ("rotor", "housing"), planets, internal=False),
+        "star": Mesh("housing", ("rotor", "output"), planets, internal=False),
+        "harmonic_circular_spline_held": Mesh("rotor", ("output", "housing"), splines, internal=True),
+        "harmonic_flexspline_held": Mesh("rotor", ("housing", "output"), splines, internal=True),
+        "spur": Mesh("housing", ("rotor", "output"), (1.0, ratio), internal=False),
+    }
+    if rig.train not in meshes:
+        raise RigError(f"rig {rig.name}: the lumped train cannot be exported, expected a real train")
+    return meshes[rig.train]
 
 
 STEP = 5e-5
@@ -221,10 +219,8 @@ def _join(
         _teeth(root, tendons, mesh)
     elif play:
         flanks = tie("play", _sum(output, {"chassis": -1.0}))
-        flanks.set("range", f"{-0.5 * play!r} {0.5 * play!r}")
-        flanks.set("limited", "true")
-        flanks.set("solreflimit", SOLREF)
-        flanks.set("solimplimit", SOLIMP)
+        limits = {"solreflimit": SOLREF, "solimplimit": SOLIMP}
+        flanks.attrib |= {"range": f"{-0.5 * play!r} {0.5 * play!r}", "limited": "true", **limits}
     else:
         tie("gear", _sum(output, {"chassis": -1.0}), *_spring(rig, "gear"))
         tie("encoder", {"chassis": 1.0, "housing": -1.0})

@@ -219,12 +219,10 @@ def diagnose(
     IdentificationError for records that cannot be diagnosed, RigError for the rig. Method: docs/diagnosis.md.
     Not to be confused with identify, which trusts the structure of the rig and fits only its values.
     """
-    from rsea_ros.checks.carried import check_diagnosable, with_check_faults
+    from rsea_ros.checks.carried import with_check_faults
     from rsea_ros.diagnosis.diagnose import diagnose as diagnose_records
 
     rig, records = load_rig(rig), notebook.records_of(data)
-    for record in [*records, *([holdout] if holdout is not None else [])]:
-        check_diagnosable(record)
     carrying = [with_check_faults(record, rig, masks=True) for record in records]
     with notebook.shown_in_notebook(progress) as say:
         result = diagnose_records(carrying, rig, holdout, say, settings=settings)

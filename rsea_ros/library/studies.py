@@ -47,15 +47,14 @@ def law(data: Record | Sequence[Record], rig: Rig | str, *, progress: Progress |
     where nothing helps on held-out blocks; each has its parameters, and the text of an effect file.
     Raises IdentificationError for records that are too short or lack a channel. Method: docs/laws.md.
     """
-    from rsea_ros.checks.carried import check_diagnosable, with_check_faults
+    from rsea_ros.checks.carried import with_check_faults
     from rsea_ros.laws.learn import learn
     from rsea_ros.library.notebook import records_of, shown_in_notebook
 
-    rig, records = load_rig(rig), records_of(data)
-    for record in records:
-        check_diagnosable(record)
+    rig = load_rig(rig)
+    records = [with_check_faults(record, rig, masks=True) for record in records_of(data)]
     with shown_in_notebook(progress) as tell:
-        return learn([with_check_faults(r, rig, masks=True) for r in records], rig, progress=tell)
+        return learn(records, rig, progress=tell)
 
 
 def experiment(
