@@ -12,8 +12,6 @@ An unsure one is reported with its probability and fitted again with more looks:
 flank is a shifted zero until the torque changes its sign.
 """
 
-from __future__ import annotations
-
 import math
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Threads that keep time: exact timers, a processor of their own, and real-time priority where permitted."""
 
-from __future__ import annotations
-
 import ctypes
 import gc
 import os

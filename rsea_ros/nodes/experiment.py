@@ -4,8 +4,6 @@ It begins with earlier recordings (`bag`). ~/approve plays the proposed run,
 ~/decline ends the session, ~/cancel stops a run softly at any sample. The results are on /diagnostics.
 """
 
-from __future__ import annotations
-
 import sys
 import threading
 from concurrent.futures import Future, ThreadPoolExecutor

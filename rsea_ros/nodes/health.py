@@ -1,7 +1,5 @@
 """health: watches a joint at work, reports changes, keeps the last minutes as a bag. It only listens."""
 
-from __future__ import annotations
-
 import math
 import os
 import shlex
