@@ -132,22 +132,16 @@ class BagWriter:
         """Flush once in an interval, and let a thread wait for the disk; call it also while nothing comes."""
         if time.monotonic() - self._flushed > self._interval:
             self.flush()
-            if self._recording:
-                self._sync()
+            if self._recording and self._syncing.done():
+                with self._name_failure():
+                    self._syncing.result()
+                self._syncing = self._disk.submit(self._storage.sync)
 
     def flush(self) -> None:
         """Make written data safe against the end of this process."""
         with self._name_failure():
             self._storage.flush()
         self._flushed = time.monotonic()
-
-    def _sync(self) -> None:
-        """Put flushed data on the disk, unless the previous sync is still running."""
-        if not self._syncing.done():
-            return
-        with self._name_failure():
-            self._syncing.result()
-        self._syncing = self._disk.submit(self._storage.sync)
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None

@@ -84,21 +84,17 @@ class Player:
         """Go softly to zero, command zero torque after the last command, and wait until that has arrived."""
         if not self.started:
             self._node.destroy_subscription(self._measurements)
-        self._end_softly()
+        deadline = time.monotonic() + 2.0 * SOFT
+        if self.started and self.next < len(self.command):
+            self.stop()
+        while self.started and self.cycle.error is None and time.monotonic() < deadline and not self.over():
+            time.sleep(0.005)
         self.cycle.stop()
         last = max(self._stamp, time.time_ns())
         for k in range(1, CLOSING_ZEROS + 1 if self.started else 1):
             stamp = last + round(k * SECOND / self.rate)
             self._publisher.publish(ros.torque_command_message(stamp, 0.0, self._joint))
         await_arrival(self._publisher)
-
-    def _end_softly(self) -> None:
-        """Wait for the soft end of a run that is under way, unless its thread has failed."""
-        deadline = time.monotonic() + 2.0 * SOFT
-        if self.started and self.next < len(self.command):
-            self.stop()
-        while self.started and self.cycle.error is None and time.monotonic() < deadline and not self.over():
-            time.sleep(0.005)
 
     def _begin(self, message: ros.JointState) -> None:
         """Start at a whole number of periods after a measurement, once all subscribers listen."""

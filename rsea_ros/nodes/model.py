@@ -90,14 +90,11 @@ class ModelNode(Program):
                 t = self._inputs.seconds(stamp)
                 heard = self._band.take(t, estimate)
                 pure = self._error.take(t, estimate, heard=heard) == PURE
-                self._flags.show(stamp, pure and not self._doubted)
+                silent = self._has_ft and self._inputs.ft_silent  # nobody knows the torque then
+                stopped = self._stopped.frozen or self._stopped.unmoved
+                doubted = stopped or silent or self._assess.contradictions
+                self._flags.show(stamp, pure and not doubted)
                 self._assess.tell(estimate)
-
-    @property
-    def _doubted(self) -> bool:
-        """Whether a sensor is silent, has stopped or is wrong: nobody knows the torque then."""
-        stopped = self._stopped.frozen or self._stopped.unmoved or (self._has_ft and self._inputs.ft_silent)
-        return bool(stopped or self._assess.contradictions)
 
     def _report(self) -> NodeHealth:
         with self._lock:
