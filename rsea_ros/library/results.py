@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +14,7 @@ from rsea_ros.identification.result import Identification, ParameterEstimate
 from rsea_ros.library import notebook
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig, save_rig
+from rsea_ros.outputs.new_files import Destination
 from rsea_ros.progress import Progress
 from rsea_ros.records.record import Record
 
@@ -73,7 +75,6 @@ class Fit:
 
         force: replace existing results; without it they raise OutputError.
         """
-        from rsea_ros.outputs.new_files import Destination
         from rsea_ros.report.identification import write_results
 
         return write_results(self.result, Destination(Path(directory), force))
@@ -187,7 +188,6 @@ class Diagnosed:
         force: replace existing results; without it they raise OutputError.
         """
         from msg_adapters.records import write_overlay
-        from rsea_ros.outputs.new_files import Destination
         from rsea_ros.report.diagnosis.page import write_diagnosis
 
         return write_diagnosis(self.result, self.record, Destination(Path(directory), force), write_overlay)
@@ -198,8 +198,6 @@ class Diagnosed:
         return f"Diagnosed({self.result.rig_name}: {self.verdict}, causes: {causes})"
 
     def _repr_html_(self) -> str:
-        from html import escape
-
         return f"<pre>{escape(self.summary())}</pre>"
 
 

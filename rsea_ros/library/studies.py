@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from rsea_ros.design.motor_gear_units import PAPERS, unit_named
 from rsea_ros.documents.wording import did_you_mean, quote
 from rsea_ros.errors import ParameterError, check_kind, check_number, check_rate
+from rsea_ros.library.notebook import records_of, shown_in_notebook
 from rsea_ros.library.results import Diagnosed, Fit
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig, save_rig
@@ -49,7 +50,6 @@ def law(data: Record | Sequence[Record], rig: Rig | str, *, progress: Progress |
     """
     from rsea_ros.checks.carried import with_check_faults
     from rsea_ros.laws.learn import learn
-    from rsea_ros.library.notebook import records_of, shown_in_notebook
 
     rig = load_rig(rig)
     records = [with_check_faults(record, rig, masks=True) for record in records_of(data)]
@@ -77,7 +77,6 @@ def experiment(
     from rsea_ros.experiment.run_shape import limits_of
     from rsea_ros.experiment.stored_models import hypotheses_from, model_of
     from rsea_ros.identification.solver import worker_pools
-    from rsea_ros.library.notebook import shown_in_notebook
 
     check_kind("models", models, Sequence, "two or more rigs or files")
     check_kind("limits", limits, Mapping, 'limits by name, SI: {"torque": 20.0}')

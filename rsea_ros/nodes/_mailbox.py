@@ -26,13 +26,6 @@ class Polled(CallbackGroup):
         """Return False: never by an executor."""
         return False
 
-    def beginning_execution(self, entity: object) -> bool:
-        """Return False: never by an executor."""
-        return False
-
-    def ending_execution(self, entity: object) -> None:
-        """Do nothing."""
-
 
 @dataclass(frozen=True)
 class MessageFields:
