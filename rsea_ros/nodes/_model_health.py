@@ -54,7 +54,7 @@ class ModelHealth:
         self.estimate = estimate
         self.count += 1
         if self.count % EVERY == 0:
-            self._calibrate()
+            self._calibrate(estimate.sigma_distal)
         if self.count % COMPARED == 0:
             now = self._observer.scores()
             change, self._scores = now - self._scores, now
@@ -78,7 +78,7 @@ class ModelHealth:
         )
         troubles = [*stopped, *self.contradictions, *self._silence(), *doubts]
         summary = "; ".join(troubles) or self._error.verdict
-        values = {**self._band(), **self._doubt()}
+        values = self._values(self.estimate)
         for name, t in tests.items():
             values |= {f"{name}.innovation": f"{t.ratio:.3f}", f"{name}.innovation_limit": f"{t.limit:.3f}"}
             values[f"{name}.innovation_mean"] = f"{t.mean:.3g}"
@@ -100,12 +100,10 @@ class ModelHealth:
             if rms > limit and tests[name].broken
         ]
 
-    def _calibrate(self) -> None:
-        if self.estimate is None or math.isnan(self._inputs.period):
-            return
-        now = (self._inputs.period, self.estimate.sigma_distal)
+    def _calibrate(self, sigma: float) -> None:
+        now = (self._inputs.period, sigma)
         alike = all(abs(a - b) <= CHANGED * b for a, b in zip(now, self._calibrated, strict=True))
-        if not alike:
+        if not (alike or math.isnan(now[0])):
             self._torque_band.calibrate(self._observer.error_model(now[0]), now[0])
             self._calibrated = now
 
@@ -118,7 +116,7 @@ class ModelHealth:
         doubt = f"sigma of the distal torque {self.estimate.sigma_distal:.3g} N·m"
         return [f"no ft for {self._inputs.ft_age:.2f} s: estimated without it, {doubt}"]
 
-    def _band(self) -> dict[str, object]:
+    def _values(self, estimate: TorqueEstimate) -> dict[str, object]:
         reading = self._torque_band.occupied()
         is_known = math.isfinite(reading.hz)
         gain, phase = self._torque_band.error_at(reading.hz) if is_known else (math.nan, math.nan)
@@ -135,15 +133,10 @@ class ModelHealth:
             "share_above": f"{reading.share_above:.4f}",
             "gain_error_db": f"{gain:.2f}",
             "phase_error_deg": f"{phase:.1f}",
-        }
-
-    def _doubt(self) -> dict[str, object]:
-        assert self.estimate is not None
-        return {
-            "sigma_distal": f"{self.estimate.sigma_distal:.4g}",
-            "sigma_proximal": f"{self.estimate.sigma_proximal:.4g}",
-            "disturbance": f"{self.estimate.disturbance:.4g}",
-            "sigma_disturbance": f"{self.estimate.sigma_disturbance:.4g}",
+            "sigma_distal": f"{estimate.sigma_distal:.4g}",
+            "sigma_proximal": f"{estimate.sigma_proximal:.4g}",
+            "disturbance": f"{estimate.disturbance:.4g}",
+            "sigma_disturbance": f"{estimate.sigma_disturbance:.4g}",
             "ft_age_ms": f"{1e3 * self._inputs.ft_age:.1f}",
             "late_samples": self._observer.late,
             "too_late_samples": self._observer.refused,

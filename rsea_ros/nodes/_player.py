@@ -5,7 +5,6 @@ A live run is played and recorded, and valid only without a failure.
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable
 
@@ -16,7 +15,7 @@ from rclpy.publisher import Publisher
 from msg_adapters import ros
 from rsea_ros.errors import DeviceError, RseaError
 from rsea_ros.experiment.joint_weighing import SHORTEST
-from rsea_ros.nodes._cycle import SECOND, Cycle
+from rsea_ros.nodes._cycle import SECOND, Cycle, on_grid
 from rsea_ros.nodes._qos import COMMAND, DISCOVERY_TIME, MEASUREMENT, await_arrival
 from rsea_ros.nodes._tap import Ears
 from rsea_ros.records.record import FloatArray, Record
@@ -101,14 +100,9 @@ class Player:
         if self.started or self.stopped or self.subscriptions < self._wanted or not self._ready():
             return
         self.started = True
-        self.cycle.start(self._first(ros.stamp_of(message.header.stamp)) - self._lead)
-        self._node.destroy_subscription(self._measurements)
-
-    def _first(self, measured: int) -> int:
-        """Return when the first command takes effect, ns."""
         earliest = time.time_ns() + self._lead + DISCOVERY_TIME
-        periods = math.ceil((earliest - measured) * self.rate / SECOND)
-        return measured + round(periods * SECOND / self.rate)
+        self.cycle.start(on_grid(earliest, ros.stamp_of(message.header.stamp), self.rate) - self._lead)
+        self._node.destroy_subscription(self._measurements)
 
     def _step(self, now: int) -> None:
         """Publish the next command, or leave it out when this thread was held up for too long."""

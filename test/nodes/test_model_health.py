@@ -182,8 +182,7 @@ def test_the_band_learns_the_noise_where_it_has_settled_or_changed():
     learnt = []
     health._torque_band = SimpleNamespace(calibrate=lambda error, period: learnt.append((error, period)))
     health._observer = SimpleNamespace(error_model=lambda period: f"error at {period}")
-    estimate = health.estimate
     for sigma, period in ((0.1, 0.01), (0.109, 0.0109), (0.112, 0.01), (0.112, 0.0112), (0.112, math.nan)):
-        health._inputs.period, estimate.sigma_distal = period, sigma
-        health._calibrate()
+        health._inputs.period = period
+        health._calibrate(sigma)
     assert learnt == [("error at 0.01", 0.01), ("error at 0.01", 0.01), ("error at 0.0112", 0.0112)]
