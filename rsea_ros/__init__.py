@@ -21,8 +21,7 @@ if TYPE_CHECKING:
     from rsea_ros.diagnosis.settings import DiagnosisSettings
     from rsea_ros.errors import RseaError
     from rsea_ros.library.records import check, read_bag, simulate
-    from rsea_ros.library.results import diagnose, identify
-    from rsea_ros.library.studies import design, experiment, law, save
+    from rsea_ros.library.results import design, diagnose, experiment, identify, law, save
     from rsea_ros.model.observer.observer import Observer, observe
     from rsea_ros.model.prediction_errors import predict
     from rsea_ros.model.rig import Rig
@@ -39,17 +38,17 @@ DOOR = {
     "TorqueController": "control.controller",
     "check": "library.records",
     "closed_loop": "control.following",
-    "design": "library.studies",
+    "design": "library.results",
     "diagnose": "library.results",
     "effects": "effects",
-    "experiment": "library.studies",
+    "experiment": "library.results",
     "identify": "library.results",
-    "law": "library.studies",
+    "law": "library.results",
     "load_rig": "model.rig_file",
     "observe": "model.observer.observer",
     "predict": "model.prediction_errors",
     "read_bag": "library.records",
-    "save": "library.studies",
+    "save": "library.results",
     "simulate": "library.records",
 }
 """The names that `import rsea_ros` offers, and the module of each."""

@@ -1,6 +1,5 @@
-"""Topics whose messages wait until somebody takes them: their numbers, read out of the serialised ones."""
+"""A topic whose messages wait until somebody takes them: their numbers, read out of the serialised ones."""
 
-import math
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -12,10 +11,7 @@ from rclpy.qos import QoSProfile
 
 from msg_adapters.cdr import RawReader
 from msg_adapters.ros import message_type
-from msg_adapters.topic_map import JOINT_STATE, WRENCH, sign_and_index
 from rsea_ros.errors import ParameterError
-from rsea_ros.model.observer.log import COMMAND, FT, STATE
-from rsea_ros.nodes._commands import HORIZON
 from rsea_ros.nodes._qos import OVERRIDES
 
 
@@ -84,50 +80,3 @@ class Mailbox:
                 if self._keep is not None:
                     self._keep(message[1]["received_timestamp"], message[0])
                 yield stamp, numbers, message[1]["received_timestamp"]
-
-
-Keep = Callable[[str, str, int, bytes], None]
-Event = tuple[int, int, float, float]
-"""Stamp (ns), kind (of observer/log.py) and values: position and motor torque, or ft, or command."""
-
-
-class JointTopics:
-    """Commands, states and wrenches of a joint. refused: messages of no use. unstamped: commands."""
-
-    def __init__(
-        self, node: Node, axis: str, joint: str, commands: QoSProfile, measured: QoSProfile,
-        keep: Keep | None = None,
-    ) -> None:  # fmt: skip
-        """joint: name that it must have; empty for any. keep: gets topic, type, arrival (ns), bytes."""
-        self._sign, along = sign_and_index(axis)
-        self.refused = self.unstamped = 0
-
-        def mailbox(topic: str, kind: str, qos: QoSProfile, *fields: tuple[str, int]) -> Mailbox:
-            def hear(at: int, raw: bytes) -> None:
-                if keep is not None:
-                    keep(box.subscription.topic_name, kind, at, raw)
-
-            read = MessageFields(kind, fields, "" if topic == "ft" else joint)
-            box = Mailbox(node, topic, read, qos, self.refuse, keep=hear)
-            return box
-
-        self._commands = mailbox("torque_command", JOINT_STATE, commands, ("effort", 0))
-        self._states = mailbox("joint_states", JOINT_STATE, measured, ("position", 0), ("effort", 0))
-        self.ft = mailbox("ft", WRENCH, measured, ("wrench", along))
-
-    def events(self) -> list[Event]:
-        """Return what has come since the last call, commands first."""
-        events = [(t, COMMAND, u, math.nan) for t, (u,), _ in self._commands.take()]
-        events += [(t, STATE, q, u) for t, (q, u), _ in self._states.take()]
-        return events + [(t, FT, self._sign * y, math.nan) for t, (y,), _ in self.ft.take()]
-
-    def instant(self, stamp: int, newest: int) -> int:
-        """Return when a command counts: at its stamp, or at the newest measurement's if it is not near."""
-        if stamp == 0 or (newest and abs(stamp - newest) > HORIZON):
-            self.unstamped += 1
-            return newest
-        return stamp
-
-    def refuse(self) -> None:
-        """Count a message of no use."""
-        self.refused += 1

@@ -11,7 +11,7 @@ from rsea_ros.model.pure_torque_error import ErrorFlag
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.torque_band import TorqueBand
 from rsea_ros.nodes._health import OK, WARN
-from rsea_ros.nodes._model_health import UNMOVED, ModelHealth
+from rsea_ros.nodes.model import UNMOVED, ModelHealth
 
 RIG = load_rig("paper_high_impedance")
 RATE, NOISE = 280.0, noise_of(RIG)
