@@ -11,7 +11,7 @@ from rsea_ros.cli._terminal import say
 from rsea_ros.design.mechanism import UNITS, Requirement
 from rsea_ros.design.motor_gear_units import PAPERS, unit_named
 from rsea_ros.model.train import TRAINS
-from rsea_ros.outputs.new_files import NewFiles
+from rsea_ros.outputs.files import NewFiles
 from rsea_ros.report import words
 from rsea_ros.report.result_files import DESIGN_JSON, REPORT, json_text
 

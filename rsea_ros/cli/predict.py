@@ -13,7 +13,7 @@ from rsea_ros.cli._output import add_force
 from rsea_ros.cli._topics import add_topic_options, cut, topic_map
 from rsea_ros.model.prediction_errors import predict
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.outputs.new_files import check_free, write_file
+from rsea_ros.outputs.files import check_free, write_file
 from rsea_ros.records.stamps import repair_stamps
 from rsea_ros.report.result_files import fault_json, pick
 

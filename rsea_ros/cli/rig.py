@@ -11,7 +11,7 @@ from rsea_ros.documents.wording import list_names
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.rig import END_NAMES, Rig
 from rsea_ros.model.rig_file import load_rig, packaged
-from rsea_ros.outputs.new_files import check_free, write_file
+from rsea_ros.outputs.files import check_free, write_file
 
 HELP = "start a rig for your bench (new), or check a rig and show its values (check)"
 EXAMPLE = "rsea rig new my_bench && rsea rig check my_bench.yaml"

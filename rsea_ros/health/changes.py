@@ -22,8 +22,8 @@ import numpy as np
 from rsea_ros.health import hypotheses as hypo
 from rsea_ros.health.health_finding import UNEXPLAINED, HealthFinding, WatchSettings
 from rsea_ros.health.recursive_estimates import Cusum, Estimates, Scatter, threshold
+from rsea_ros.model.observer.assemble import Noise
 from rsea_ros.model.observer.log import BatchObserver
-from rsea_ros.model.observer.signal_noise import Noise
 from rsea_ros.model.rig import Rig
 from rsea_ros.records.record import FloatArray
 from rsea_ros.records.statistics import Z95

@@ -18,7 +18,7 @@ from rsea_ros.library import notebook
 from rsea_ros.library.notebook import records_of, shown_in_notebook
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig, save_rig
-from rsea_ros.outputs.new_files import Destination
+from rsea_ros.outputs.files import Destination
 from rsea_ros.progress import Progress
 from rsea_ros.records.record import Record
 

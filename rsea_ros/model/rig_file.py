@@ -149,7 +149,7 @@ def save_rig(rig: Rig, path: str | Path, *, force: bool = False) -> None:
 
     Raises RigError, and leaves nothing behind, when it cannot be written.
     """
-    from rsea_ros.outputs.new_files import write_file  # a rig that is only read needs no writer
+    from rsea_ros.outputs.files import write_file  # a rig that is only read needs no writer
 
     try:
         write_file(path, rig_text(rig), force=force)

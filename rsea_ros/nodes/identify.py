@@ -29,8 +29,7 @@ from rsea_ros.nodes._health import OK, WARN, Health, NodeHealth
 from rsea_ros.nodes._parameters import AXIS, NodeParameter
 from rsea_ros.nodes._run import run_node
 from rsea_ros.nodes._tap import Ears
-from rsea_ros.outputs.files import unused_path
-from rsea_ros.outputs.new_files import Destination, check_free
+from rsea_ros.outputs.files import Destination, check_free, unused_path
 from rsea_ros.records.record import Record
 from rsea_ros.report.diagnosis.words import diagnosis_sentence
 from rsea_ros.report.identification import verdict_sentence, write_results

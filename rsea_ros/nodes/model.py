@@ -13,7 +13,7 @@ from msg_adapters.cdr import RawWriter
 from msg_adapters.ros import Bool, JointState, bool_message, efforts_message
 from msg_adapters.topic_map import TYPES
 from rsea_ros.model.observer import Noise, Observer, TorqueEstimate
-from rsea_ros.model.observer.signal_noise import Consistency, consistency
+from rsea_ros.model.observer.assemble import Consistency, consistency
 from rsea_ros.model.pure_torque_error import PURE, ErrorFlag, ErrorSettings
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig

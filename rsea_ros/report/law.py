@@ -10,7 +10,7 @@ import numpy as np
 from rsea_ros.effects.catalogue import lend
 from rsea_ros.laws.law import Law, LawResult, WrittenLaw, about_of, equation_of
 from rsea_ros.model.rig_file import rig_text
-from rsea_ros.outputs.new_files import Destination, NewFiles
+from rsea_ros.outputs.files import Destination, NewFiles
 from rsea_ros.records.record import UNITS, FloatArray
 from rsea_ros.records.statistics import Z95
 from rsea_ros.report import page as html, words

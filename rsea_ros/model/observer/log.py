@@ -15,8 +15,7 @@ import numpy.typing as npt
 
 from rsea_ros.compiler import njit
 from rsea_ros.model.observer import filter as kf
-from rsea_ros.model.observer.assemble import assemble, without_delay
-from rsea_ros.model.observer.signal_noise import Noise
+from rsea_ros.model.observer.assemble import Noise, assemble, without_delay
 from rsea_ros.model.rig import Rig
 from rsea_ros.records.record import FloatArray, IntArray, Record
 

@@ -17,9 +17,15 @@ from numba.extending import intrinsic
 from rsea_ros.compiler import njit
 from rsea_ros.errors import check_kind
 from rsea_ros.model.observer import log as logs
-from rsea_ros.model.observer.assemble import assemble, without_delay
+from rsea_ros.model.observer.assemble import (
+    Consistency,
+    Noise,
+    assemble,
+    consistency,
+    noise_of,
+    without_delay,
+)
 from rsea_ros.model.observer.filter import LACK, SIGMA, FilterModel, FilterState, inner
-from rsea_ros.model.observer.signal_noise import Consistency, Noise, consistency, noise_of
 from rsea_ros.model.observer.transition import transition
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.step import Calls, Linear
