@@ -85,8 +85,7 @@ def _in_runs(repeat: BoolArray, least: float) -> BoolArray:
     number = np.cumsum(~repeat)
     length = np.bincount(number)
     usual = float(np.quantile(length[length > 0], 0.95))
-    long: BoolArray = length[number] > max(_LONG_RUN * usual, least)
-    return long
+    return np.asarray(length[number] > max(_LONG_RUN * usual, least))
 
 
 def simultaneous_holds(record: Record, name: str) -> BoolArray:

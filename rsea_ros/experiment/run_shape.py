@@ -170,7 +170,7 @@ class Shape:
 
     amplitude: N m, peak of the moving part. bias: N m, held beside it. low, high: band, Hz, of multisine and
     chirp. tilt: an amplitude goes with frequency to the power of -tilt, 1. hold: s, of one level of steps (up
-    and down at random) and holds (a staircase up and down).
+    and down at random) and holds (a staircase up and down). rest: share of the run, at its end, at zero.
     """
 
     kind: Kind
@@ -180,20 +180,22 @@ class Shape:
     high: float = 60.0
     tilt: float = 0.0
     hold: float = 0.5
+    rest: float = 0.0
 
 
 def command_of(shape: Shape, duration: float, rate: float, slew: float = np.inf) -> FloatArray:
     """Return the command of a shape, N m, shape (n,), at rest for LEAD before it and TAIL after it.
 
-    duration: s, of the excitation, its ramps included. slew: N m/s. Where its change from sample to
+    duration: s, of the excitation, its ramps and rest included. slew: N m/s. Where its change from sample to
     sample would be faster, a multisine or chirp gets smaller and a step becomes a ramp.
     """
     n = round(duration * rate)
-    part = KINDS[shape.kind](shape, n, rate)
-    run = excitation.ramp_ends(shape.bias + shape.amplitude * part, min(round(RAMP * rate), n // 4))
+    moving = n - round(shape.rest * n)
+    part = KINDS[shape.kind](shape, moving, rate)
+    run = excitation.ramp_ends(shape.bias + shape.amplitude * part, min(round(RAMP * rate), moving // 4))
     if np.isfinite(slew):
         run = slow(run, slew / rate, is_stepped=shape.kind in ("steps", "holds"))
-    return at_rest_around(run, rate)
+    return at_rest_around(np.concatenate([run, np.zeros(n - moving)]), rate)
 
 
 def at_rest_around(run: FloatArray, rate: float) -> FloatArray:

@@ -179,8 +179,7 @@ class ErrorFlag:
             distal = proximal = math.nan
         if math.isnan(t):
             return int(self._state[VERDICT])
-        verdict: int = judge_error(self._state, self._ring, t, distal, proximal, sigma, heard)
-        return verdict
+        return int(judge_error(self._state, self._ring, t, distal, proximal, sigma, heard))
 
     @property
     def verdict(self) -> str:

@@ -293,8 +293,7 @@ def _kick(machine: Machine, channel: str) -> float:
 
 def _middles(ends: FloatArray) -> FloatArray:
     """Return the values at the middle of each step from those at their ends."""
-    middles: FloatArray = 0.5 * (ends + np.concatenate([ends[:1], ends[:-1]]))
-    return middles
+    return np.asarray(0.5 * (ends + np.concatenate([ends[:1], ends[:-1]])))
 
 
 def run(machine: Machine, command: FloatArray, out: FloatArray, *, start: float = 0.0,

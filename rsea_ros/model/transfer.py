@@ -265,5 +265,4 @@ def _inner(a: _Complex, b: _Complex) -> FloatArray:
 def _positive_roots(p: npt.NDArray[np.floating]) -> FloatArray:
     """Return the real roots above zero, rad/s."""
     roots = polynomial.polyroots(polynomial.polytrim(p))
-    real: FloatArray = roots[(np.abs(roots.imag) <= 1e-9 * np.abs(roots)) & (roots.real > 0.0)].real
-    return real
+    return np.asarray(roots[(np.abs(roots.imag) <= 1e-9 * np.abs(roots)) & (roots.real > 0.0)].real)

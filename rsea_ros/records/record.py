@@ -339,8 +339,7 @@ def _vector(name: str, values: npt.ArrayLike, source: str) -> FloatArray:
         raise ChannelError(
             f"{source}: {name} has shape {numbers.shape}, expected (n,) with n >= {FEWEST} samples"
         )
-    filled: FloatArray = numbers.filled(np.nan)
-    return filled
+    return np.asarray(numbers.filled(np.nan))
 
 
 def torques_from(name: str, values: npt.ArrayLike, fewest: int) -> FloatArray:

@@ -174,8 +174,7 @@ def _in_bins(x: FloatArray, y: FloatArray, law: FloatArray) -> FloatArray:
         values, few = y[which == k], np.sum(which == k) < _FEWEST
         mean = (np.nan, np.nan) if few else (values.mean(), Z95 * values.std() / np.sqrt(len(values)))
         rows.append((0.5 * (edges[k] + edges[k + 1]), *np.quantile(law[which == k], (0.1, 0.9)), *mean))
-    shown: FloatArray = np.array(rows).T
-    return shown
+    return np.asarray(np.array(rows).T)
 
 
 _CLEARLY = 0.1

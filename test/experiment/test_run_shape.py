@@ -35,8 +35,9 @@ def moving(shape, duration=8.0, **options):
     return run[LEAD:-TAIL]
 
 
-def test_a_staircase_goes_up_and_down():
-    run = moving(Shape("holds", 10.0, bias=2.0, hold=0.5), duration=6.0)
+def test_a_staircase_goes_up_and_down_and_rests_at_its_end():
+    run = moving(Shape("holds", 10.0, bias=2.0, hold=0.5, rest=0.25))
+    assert len(run) == 1600 and not run[1200:].any()
     middles = run[100 + 50 : 1100 : 100]
     assert middles.tolist() == pytest.approx([9.0, 12.0, 9.0, 5.5, 2.0, -1.5, -5.0, -8.0, -5.0, -1.5])
     rise = run[:RAMP] / 5.5

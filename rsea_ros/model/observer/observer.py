@@ -201,8 +201,7 @@ class Observer:
 
     def scores(self) -> FloatArray:
         """Return the sums since the start of which `consistency` takes differences, shape (3, 3)."""
-        scores: FloatArray = self._state.score.reshape(3, 3).copy()
-        return scores
+        return np.array(self._state.score.reshape(3, 3))
 
     def error_model(self, dt: float) -> ErrorModel:
         """Return the error dynamics at a period of dt s, with the present gain K = P h' / r."""
