@@ -26,14 +26,13 @@ from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
 
-from rsea_ros.documents.wording import brief
-from rsea_ros.fleet import FleetError, need_extra
-from rsea_ros.outputs.files import Destination, NewFiles, make_folder, write_file
+import pyarrow as pa
+import pyarrow.compute as pc
+from pyarrow import parquet
 
-need_extra()  # says in one line what the next ones lack
-import pyarrow as pa  # noqa: E402
-import pyarrow.compute as pc  # noqa: E402
-from pyarrow import parquet  # noqa: E402
+from rsea_ros.documents.wording import brief
+from rsea_ros.fleet import FleetError
+from rsea_ros.outputs.files import Destination, NewFiles, make_folder, write_file
 
 SCHEMA = 1
 """Grows when a column changes its meaning; a store of a higher one is not read."""
