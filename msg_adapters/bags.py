@@ -6,9 +6,8 @@ from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from msg_adapters import metadata
 from msg_adapters.compression import ERRORS, ZSTD_MAGIC, Allowance, unpack_file, unpack_message
-from msg_adapters.contents import AND, Contents, Messages
+from msg_adapters.contents import AND, METADATA, Contents, Messages, metadata_of
 from rsea_ros.documents.wording import brief
 from rsea_ros.errors import BagError
 
@@ -71,7 +70,7 @@ def _bag(path: Path, contents: Contents) -> list[Contents]:
         raise BagError(f"{path}: no such bag")
     if not path.is_dir():
         return [_scan(path, contents)]
-    known = metadata.metadata_of(path, contents)
+    known = metadata_of(path, contents)
     files = known.files or sorted(file for file in path.iterdir() if _suffix(file) in SCANNERS)
     if not files:
         raise BagError(f"{path}: no bag, expected a directory with .mcap, .db3 or .bag files")
@@ -80,7 +79,7 @@ def _bag(path: Path, contents: Contents) -> list[Contents]:
     contents.take(known.remarks)
     for topic, expected in known.counts.items():
         read = sum(len(part.topics[topic].raw) for part in parts if topic in part.topics)
-        contents.compare(topic, expected, read, metadata.NAME)
+        contents.compare(topic, expected, read, METADATA)
     return parts
 
 
@@ -89,7 +88,7 @@ def _tell_unnamed(folder: Path, files: Sequence[Path], contents: Contents) -> No
     read = ", ".join(file.name for file in files[:_MOST_NAMED])
     for file in sorted(folder.iterdir()):
         if file not in files and _suffix(file) in SCANNERS:
-            detail = f"left out: {metadata.NAME} names {read} only; give {brief(file.name)} itself to read it"
+            detail = f"left out: {METADATA} names {read} only; give {brief(file.name)} itself to read it"
             contents.tell("unnamed_file", file.name, detail)
 
 

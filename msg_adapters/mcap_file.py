@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from msg_adapters.compression import ERRORS, Allowance, unpack_chunk
-from msg_adapters.contents import NAME as REMARKS, Contents, remarks_of
+from msg_adapters.contents import REMARKS, Contents, remarks_of
 
 MAGIC = b"\x89MCAP0\r\n"
 HEADER, FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, MESSAGE_INDEX, CHUNK_INDEX, ATTACHMENT = range(1, 10)

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from msg_adapters import mcap_file as mcap
-from msg_adapters.contents import NAME as REMARKS
+from msg_adapters.contents import REMARKS
 from msg_adapters.topic_map import definition
 from rsea_ros.outputs.files import create, write_at
 from rsea_ros.records.record import IntArray

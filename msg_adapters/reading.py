@@ -111,7 +111,13 @@ def record_from(contents: Contents, source: str, topics: TopicMap, *, strict: bo
                 repeated = f"{repeats} of {len(one.stamps)} stamps repeat"
                 report.notes.append(f"{one.where}: {repeated}, the first of each kept")
     series = _on_the_clock_of_the_command(series, report)
-    _require_values(source, series, strict, report)
+    if strict and "command" not in series and "reference" not in series:
+        raise BagError(f"{source}: the command's messages hold no effort, expected the torque in N·m")
+    if not set(series) - ({"command", "reference"} if strict else set()):
+        raise BagError(
+            f"{source}: no measurement is left{report.remarks()}, expected joint states or F/T with values, "
+            "stamped by the command's clock"
+        )
     tell_health(contents, report, topics.namespace)
     return _record(series, source, report, strict)
 
@@ -170,19 +176,6 @@ def _remedy(contents: Contents, roles: Sequence[str]) -> str:
 def _topics_text(contents: Contents) -> str:
     topics = sorted(contents.topics.items())[:_MOST_NAMED]
     return ", ".join(f"{brief(name)} ({brief(m.msgtype)})" for name, m in topics) or "no topic at all"
-
-
-def _require_values(
-    source: str, series: Mapping[str, FieldSamples], strict: bool, report: Contents
-) -> None:
-    """Refuse messages whose arrays are empty where values are needed, and measurements of another clock."""
-    if strict and "command" not in series and "reference" not in series:
-        raise BagError(f"{source}: the command's messages hold no effort, expected the torque in N·m")
-    if not set(series) - ({*COMMANDS} if strict else set()):
-        raise BagError(
-            f"{source}: no measurement is left{report.remarks()}, expected joint states or F/T with values, "
-            "stamped by the command's clock"
-        )
 
 
 def _series(

@@ -10,9 +10,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from pathlib import Path
 
-from msg_adapters import metadata
 from msg_adapters.compression import Allowance
-from msg_adapters.contents import Contents, Messages
+from msg_adapters.contents import LARGEST, VERSION, Contents, Messages, remarks_in
 from msg_adapters.topic_map import definition
 from rsea_ros.outputs.files import create
 from rsea_ros.records.record import IntArray
@@ -20,7 +19,7 @@ from rsea_ros.records.record import IntArray
 MAGIC = b"SQLite format 3\x00"
 TOPICS = "SELECT id, name, type FROM topics"
 MESSAGES = "SELECT topic_id, timestamp, data FROM messages"
-METADATA = f"SELECT metadata FROM metadata WHERE length(metadata) <= {metadata.LARGEST} LIMIT 1"
+METADATA = f"SELECT metadata FROM metadata WHERE length(metadata) <= {LARGEST} LIMIT 1"
 COLUMNS = {"topics": {"id", "name", "type"}, "messages": {"topic_id", "timestamp", "data"}}
 PRAGMAS = ("trusted_schema=OFF", "cell_size_check=ON", "query_only=ON")
 JOURNALS = ("-wal", "-journal")
@@ -134,7 +133,7 @@ def _remarks(database: sqlite3.Connection, path: Path, contents: Contents) -> No
     except sqlite3.Error:
         return
     for (data,) in rows:
-        contents.take(metadata.remarks_in(path, data if isinstance(data, bytes) else b""))
+        contents.take(remarks_in(path, data if isinstance(data, bytes) else b""))
 
 
 def _text(data: bytes | str) -> str:
@@ -187,7 +186,7 @@ class SqliteStorage:
     def remark(self, texts: Mapping[str, str], known: str) -> None:
         """Keep the metadata of the bag, which hold the texts too, where rosbag2 keeps them."""
         with _system_errors():
-            self._database.execute(f"INSERT INTO metadata VALUES (NULL, {metadata.VERSION}, ?)", (known,))
+            self._database.execute(f"INSERT INTO metadata VALUES (NULL, {VERSION}, ?)", (known,))
 
     def close(self) -> None:
         """Commit the rest."""

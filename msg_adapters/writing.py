@@ -12,10 +12,8 @@ from types import TracebackType
 
 import numpy as np
 
-from msg_adapters import metadata
-from msg_adapters.contents import Remarks
+from msg_adapters.contents import METADATA, Remarks, Topic, metadata_text
 from msg_adapters.mcap_storage import McapStorage
-from msg_adapters.metadata import Topic
 from msg_adapters.sqlite_file import SqliteStorage
 from msg_adapters.topic_map import check_topic, definition
 from rsea_ros.errors import BagError, OutputError
@@ -134,22 +132,16 @@ class BagWriter:
         """Flush once in an interval, and let a thread wait for the disk; call it also while nothing comes."""
         if time.monotonic() - self._flushed > self._interval:
             self.flush()
-            if self._recording:
-                self._sync()
+            if self._recording and self._syncing.done():
+                with self._name_failure():
+                    self._syncing.result()
+                self._syncing = self._disk.submit(self._storage.sync)
 
     def flush(self) -> None:
         """Make written data safe against the end of this process."""
         with self._name_failure():
             self._storage.flush()
         self._flushed = time.monotonic()
-
-    def _sync(self) -> None:
-        """Put flushed data on the disk, unless the previous sync is still running."""
-        if not self._syncing.done():
-            return
-        with self._name_failure():
-            self._syncing.result()
-        self._syncing = self._disk.submit(self._storage.sync)
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
@@ -182,7 +174,7 @@ class BagWriter:
             except OutputError as error:
                 raise BagError(str(error)) from None
             inside = self.path.iterdir() if self.path.is_dir() else ()
-            if any(file.name != metadata.NAME and file.suffix not in PARTS for file in inside):
+            if any(file.name != METADATA and file.suffix not in PARTS for file in inside):
                 raise BagError(f"{self.path}: holds more than a bag, expected a new name")
 
     def _new_directory(self) -> Path:
@@ -201,7 +193,7 @@ class BagWriter:
     def _complete(self) -> None:
         """Close the file, add the metadata, and move everything to its name."""
         file, topics = self._storage.path, [topic for _, topic in self._topics.values()]
-        known = metadata.text(file, self._kind, topics, self._span, self.remarks)
+        known = metadata_text(file, self._kind, topics, self._span, self.remarks)
         if self._single:
             self._storage.remark(self.remarks.texts(), known)
         self._storage.close()
@@ -209,8 +201,8 @@ class BagWriter:
             files.give_names([(file, self.path)], force=self._force)
             files.remove(self.partial)
             return
-        files.remove(self.partial / metadata.NAME)
-        files.write_new(self.partial / metadata.NAME, known)
+        files.remove(self.partial / METADATA)
+        files.write_new(self.partial / METADATA, known)
         files.give_names([(self.partial, self.path)], force=self._force)
 
     def _clear(self) -> None:

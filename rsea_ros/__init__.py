@@ -20,10 +20,8 @@ if TYPE_CHECKING:
     from rsea_ros.control.following import closed_loop
     from rsea_ros.diagnosis.settings import DiagnosisSettings
     from rsea_ros.errors import RseaError
-    from rsea_ros.library.diagnosed import diagnose
-    from rsea_ros.library.identified import identify
     from rsea_ros.library.records import check, read_bag, simulate
-    from rsea_ros.library.studies import design, experiment, law, save
+    from rsea_ros.library.results import design, diagnose, experiment, identify, law, save
     from rsea_ros.model.observer.observer import Observer, observe
     from rsea_ros.model.prediction_errors import predict
     from rsea_ros.model.rig import Rig
@@ -40,17 +38,17 @@ DOOR = {
     "TorqueController": "control.controller",
     "check": "library.records",
     "closed_loop": "control.following",
-    "design": "library.studies",
-    "diagnose": "library.diagnosed",
+    "design": "library.results",
+    "diagnose": "library.results",
     "effects": "effects",
-    "experiment": "library.studies",
-    "identify": "library.identified",
-    "law": "library.studies",
+    "experiment": "library.results",
+    "identify": "library.results",
+    "law": "library.results",
     "load_rig": "model.rig_file",
     "observe": "model.observer.observer",
     "predict": "model.prediction_errors",
     "read_bag": "library.records",
-    "save": "library.studies",
+    "save": "library.results",
     "simulate": "library.records",
 }
 """The names that `import rsea_ros` offers, and the module of each."""
@@ -65,7 +63,14 @@ __all__ = [
 
 
 class _Study(ModuleType):
-    """A package that can be called as the function of its name: `rsea.design(torque=40.0)`."""
+    # A package that can be called as the function of its name: `rsea.design(torque=40.0)`.
+
+    @property
+    def __doc__(self) -> str:  # type: ignore[override]
+        """What `help(rsea.design)` shows."""
+        from inspect import signature
+
+        return f"{self.__name__}{signature(self.__wrapped__)}\n\n{self.__wrapped__.__doc__}"
 
     @property
     def __wrapped__(self) -> Any:

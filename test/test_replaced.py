@@ -11,8 +11,16 @@ from pathlib import Path
 import pytest
 
 from rsea_ros.outputs import files
-from rsea_ros.outputs.files import LEFT_AFTER, OLD, make_locked, make_stage, name_of, put_back, remove_left
-from rsea_ros.outputs.new_files import check_free
+from rsea_ros.outputs.files import (
+    LEFT_AFTER,
+    OLD,
+    check_free,
+    make_locked,
+    make_stage,
+    name_of,
+    put_back,
+    remove_left,
+)
 
 CALLS = ("link", "rename", "fsync", "unlink", "rmdir")
 

@@ -12,8 +12,16 @@ from pathlib import Path
 import pytest
 
 from msg_adapters import BagWriter
-from rsea_ros.outputs.files import LEFT_AFTER, PREFIX, STAGE, give_names, make_stage, name_of, remove_left
-from rsea_ros.outputs.new_files import NewFiles
+from rsea_ros.outputs.files import (
+    LEFT_AFTER,
+    PREFIX,
+    STAGE,
+    NewFiles,
+    give_names,
+    make_stage,
+    name_of,
+    remove_left,
+)
 
 KILLED = (
     "import os, signal, sys; from pathlib import Path; from rsea_ros.outputs.files import make_stage\n"

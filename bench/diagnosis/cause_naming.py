@@ -32,7 +32,7 @@ from rsea_ros.benchmark.dataset import COLUMNS, LIMIT, MANIFEST, VERSION, truth_
 from rsea_ros.benchmark.scoring import RecordTruth, truth_hash
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.model.rig_file import load_rig, rig_text
-from rsea_ros.outputs.new_files import Destination, NewFiles, check_free, write_file
+from rsea_ros.outputs.files import Destination, NewFiles, check_free, write_file
 from rsea_ros.progress import Progress
 from rsea_ros.records.record import UNITS, FloatArray, Record
 

@@ -44,7 +44,7 @@ from rsea_ros.effects.catalogue import catalogue as effects
 from rsea_ros.errors import RseaError
 from rsea_ros.hardware.netft.calibration import parse
 from rsea_ros.model.rig_file import load_rig, rig_folders
-from rsea_ros.nodes._health_inputs import noise_from
+from rsea_ros.nodes._joint_inputs import noise_from
 from rsea_ros.records.record import Channel, Record
 
 BATCH, SLOW = 50, 20

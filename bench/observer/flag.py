@@ -17,7 +17,7 @@ from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import measure, synthesize
 from rsea_ros.model.torque_band import TorqueBand
 from rsea_ros.model.transfer import end_to_end, frequency_response
-from rsea_ros.nodes._model_health import CHANGED, EVERY
+from rsea_ros.nodes.model import CHANGED, EVERY
 from rsea_ros.records.record import Channel, FloatArray
 
 CHUNK = 280 * 600

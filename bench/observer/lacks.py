@@ -16,7 +16,7 @@ import numpy as np
 from bench.results import Row
 from rsea_ros.compiler import njit
 from rsea_ros.model.observer import Observer, observe
-from rsea_ros.model.observer.signal_noise import NOTHING
+from rsea_ros.model.observer.assemble import NOTHING
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.records.record import Channel, FloatArray, Record

@@ -7,7 +7,7 @@ firmware, and the fit simulates the closed loop. The figure shows the measured a
 import numpy as np
 
 import rsea_ros as rsea
-from rsea_ros.library.result_figures import overlay_figure
+from rsea_ros.library.notebook import overlay_figure
 
 rig = rsea.load_rig("pd_joint")
 t = np.arange(2000) / 100.0  # s, targets at 100 Hz

@@ -112,12 +112,14 @@ def _descend(place: dict[str, Any], variables: dict[str, Any]) -> Any:
         if at:
             names = getattr(getattr(value, "dtype", None), "names", None)
             if names is None:
-                raise Refused(
-                    f"column {place['column']!r}: {way} is not a struct, expected one with {part}"
-                )
+                raise Refused(f"column {place['column']!r}: {way} is not a struct, expected one with {part}")
             if match["name"] not in names:
                 raise KeyError(f"{way}.{match['name']}", [f"{way}.{name}" for name in names])
-            value = _single(value, way)[match["name"]]
+            if value.size != 1:
+                raise Refused(
+                    f"{way} is an array of {value.size} structs, expected which: {way}(1), {way}(2), …"
+                )
+            value = value.ravel()[0][match["name"]]
         else:
             value = variables[match["name"]]
         way = f"{way}.{part}" if at else part
@@ -126,15 +128,6 @@ def _descend(place: dict[str, Any], variables: dict[str, Any]) -> Any:
                 raise Refused(f"{way} of {value.size}, expected a number from 1")
             value = value.ravel(order="F")[int(match["number"]) - 1 : int(match["number"])]
     return value
-
-
-def _single(value: Any, way: str) -> Any:
-    """Return the one struct of an array of them. Raises Refused for several."""
-    if value.size != 1:
-        raise Refused(
-            f"{way} is an array of {value.size} structs, expected which: {way}(1), {way}(2), …"
-        )
-    return value.ravel()[0]
 
 
 def _check_shape(place: dict[str, Any], shape: Any, kind: object, *, is_number: bool) -> None:
@@ -187,15 +180,8 @@ def _field(place: dict[str, Any], schema: Any) -> tuple[str, list[str]]:
     way, kind = base[len(name) + 1 :].split(".") if base != name else [], schema.field(name).type
     for part in way:
         if not pa.types.is_struct(kind) or part not in [field.name for field in kind]:
-            raise Refused(
-                f"column {place['column']!r}: {name} is {kind}, expected a struct with {part}"
-            )
+            raise Refused(f"column {place['column']!r}: {name} is {kind}, expected a struct with {part}")
         kind = kind.field(part).type
-    _check_kind(place, kind)
-    return name, way
-
-
-def _check_kind(place: dict[str, Any], kind: Any) -> None:
     from pyarrow import types
 
     is_list = types.is_list(kind) or types.is_large_list(kind) or types.is_fixed_size_list(kind)
@@ -208,6 +194,7 @@ def _check_kind(place: dict[str, Any], kind: Any) -> None:
     plain = (types.is_integer, types.is_floating, types.is_decimal, types.is_boolean, types.is_null)
     if not (_is_time(element) or any(is_so(element) for is_so in plain)):
         raise Refused(f"column {column!r} is {kind}, expected numbers")
+    return name, way
 
 
 def _is_time(kind: Any) -> bool:

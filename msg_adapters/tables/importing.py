@@ -200,7 +200,11 @@ def _record(path: str | Path, parts: Sequence[_Part], mapping: ImportMap) -> Rec
     for name, t, y in columns:
         channels[name], lost = _channel(name, t, y, mapping.channels[name])
         if any(term.held for term in mapping.channels[name]):
-            channels[name] = _arrivals(name, channels[name])
+            channel = channels[name]
+            new = np.diff(channel.y, prepend=np.nan) != 0.0
+            if np.count_nonzero(new) < 2:
+                raise ImportMapError(f"{name} is held at {channel.y[0]:g}, expected values that change")
+            channels[name] = Channel(channel.t[new], channel.y[new])
         faults += lost
     lines = [f"{fault.channel}: {fault.detail}" for fault in faults]
     if mapping.set_points:
@@ -305,14 +309,6 @@ def _channel(
     first = float(t[np.argmax(missing)])
     detail = f"{count} of {len(y)} values of {columns} are missing, the first at {first:.6g} s"
     return Channel(t[~missing], y[~missing]), [Fault("missing_values", name, count / len(y), detail)]
-
-
-def _arrivals(name: str, channel: Channel) -> Channel:
-    """Return the samples at which another value arrived. Raises ImportMapError for a channel without any."""
-    new = np.diff(channel.y, prepend=np.nan) != 0.0
-    if np.count_nonzero(new) < 2:
-        raise ImportMapError(f"{name} is held at {channel.y[0]:g}, expected values that change")
-    return Channel(channel.t[new], channel.y[new])
 
 
 def _stamps(

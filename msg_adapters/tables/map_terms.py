@@ -148,7 +148,14 @@ def terms_of(channel: str, value: object) -> tuple[ChannelTerm, ...]:
 
 def term_of(where: str, value: object, dimension: str) -> ChannelTerm:
     """Return a term. A unit of another dimension than the channel's needs a scale that converts it."""
-    _require_unit(value, where, dimension)
+    if isinstance(value, Mapping) and "unit" not in value:
+        units = list(FACTORS[dimension])
+        scaled = "" if dimension == "time" else ", or unit: 1 with a scale to SI units"
+        raise FieldError(
+            f"{where}: no unit, expected `unit: {units[0]}`, or {list_names(units[1:], 'or')} in its place"
+            f"{scaled}; the file does not state it",
+            where,
+        )
     body = checked_keys(value, where, TERM)
     try:
         stated_dimension, factor = unit(body["unit"])
@@ -167,18 +174,6 @@ def term_of(where: str, value: object, dimension: str) -> ChannelTerm:
     gain, constant = next(iter(joints.values()))
     by_joint = {number: both for number, both in joints.items() if number is not None}
     return ChannelTerm(column, str(body["unit"]), gain, constant, file, expression, held, by_joint)
-
-
-def _require_unit(value: object, where: str, dimension: str) -> None:
-    """Raise FieldError for a term without a unit: a file seldom states it, only its user can."""
-    if isinstance(value, Mapping) and "unit" not in value:
-        units = list(FACTORS[dimension])
-        scaled = "" if dimension == "time" else ", or unit: 1 with a scale to SI units"
-        raise FieldError(
-            f"{where}: no unit, expected `unit: {units[0]}`, or {list_names(units[1:], 'or')} in its place"
-            f"{scaled}; the file does not state it",
-            where,
-        )
 
 
 def _gains_and_constants(

@@ -146,7 +146,10 @@ def read_answers(path: Path, dataset: Dataset) -> dict[str, Answer]:
             raise BenchmarkError(f"{where}: record = {quote(name)}, expected one of {dataset.manifest}")
         if name in answers:
             raise BenchmarkError(f"{where}: a second answer to {name}, expected one")
-        answer = Answer(_causes(body.get("causes"), dataset, where), _seconds(body, where))
+        seconds = body.get("seconds", 0.0)
+        if not _is_number(seconds) or not seconds >= 0.0:
+            raise BenchmarkError(f"{where}: seconds = {quote(seconds)}, expected a number >= 0")
+        answer = Answer(_causes(body.get("causes"), dataset, where), float(seconds))
         answers[name] = answer if answer.seconds <= dataset.limit else Answer(seconds=answer.seconds)
     if not answers:
         raise BenchmarkError(f"{path}: no answer, expected one JSON object a line")
@@ -169,13 +172,6 @@ def _causes(value: Any, dataset: Dataset, where: str) -> dict[str, float]:
             raise BenchmarkError(f"{where}: probability = {quote(probability)}, expected 0 to 1")
         causes[name] = float(probability)
     return causes
-
-
-def _seconds(body: Mapping[str, Any], where: str) -> float:
-    seconds = body.get("seconds", 0.0)
-    if not _is_number(seconds) or not seconds >= 0.0:
-        raise BenchmarkError(f"{where}: seconds = {quote(seconds)}, expected a number >= 0")
-    return float(seconds)
 
 
 def _is_number(value: Any) -> bool:

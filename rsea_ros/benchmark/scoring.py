@@ -64,7 +64,14 @@ def read_truth(path: Path, dataset: Dataset) -> dict[str, RecordTruth]:
         body = records.get(name) if isinstance(records, dict) else None
         if body is None:
             raise BenchmarkError(f"{path}: no records.{name}, expected the truth of {dataset.folder}")
-        truth = _truth(body, f"{path}: records.{name}")
+        where = f"{path}: records.{name}"
+        if not isinstance(body, dict):
+            raise BenchmarkError(f"{where} is {quote(body)}, expected an object")
+        causes, shows = body.get("causes"), body.get("times_noise")
+        values = [*causes.values()] if isinstance(causes, dict) else [None]
+        if not all(isinstance(v, dict) for v in (*values, shows)):
+            raise BenchmarkError(f"{where}: expected causes and times_noise as objects")
+        truth = RecordTruth(causes, str(body.get("outside", "")), shows, str(body.get("salt", "")))  # type: ignore[arg-type]
         if truth_hash(name, truth) != expected:
             raise BenchmarkError(
                 f"{path}: records.{name} has the hash {truth_hash(name, truth)[:12]}…, expected "
@@ -72,16 +79,6 @@ def read_truth(path: Path, dataset: Dataset) -> dict[str, RecordTruth]:
             )
         truths[name] = truth
     return truths
-
-
-def _truth(body: object, where: str) -> RecordTruth:
-    if not isinstance(body, dict):
-        raise BenchmarkError(f"{where} is {quote(body)}, expected an object")
-    causes, shows = body.get("causes"), body.get("times_noise")
-    values = [*causes.values()] if isinstance(causes, dict) else [None]
-    if not all(isinstance(v, dict) for v in (*values, shows)):
-        raise BenchmarkError(f"{where}: expected causes and times_noise as objects")
-    return RecordTruth(causes, str(body.get("outside", "")), shows, str(body.get("salt", "")))  # type: ignore[arg-type]
 
 
 NAMED = 0.5

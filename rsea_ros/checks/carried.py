@@ -88,8 +88,10 @@ def with_check_faults(record: Record, rig: Rig, axis: str = "torque.z", *, masks
     """Return the record with the faults that the checks find, for the result.
 
     axis: of the wrench that `ft` was read from. masks: see with_faults.
-    Raises IdentificationError where nothing moves.
+    Raises IdentificationError where nothing moves, with masks for every record that cannot be diagnosed.
     """
+    if masks:
+        check_diagnosable(record)
     check_pace(record)
     require_motion(record)
     return with_faults(note_unused(record, rig), check_record(record, rig, axis), masks=masks)

@@ -302,5 +302,4 @@ def moves(channel: Channel) -> BoolArray:
     change = np.ptp(windows, axis=1)
     quiet = float(np.quantile(change, 0.02))
     largest = float(np.quantile(change, 0.99))
-    clearly: BoolArray = change > max(min(_CLEARLY * quiet, 0.5 * largest), 1e-3 * largest)
-    return clearly
+    return np.asarray(change > max(min(_CLEARLY * quiet, 0.5 * largest), 1e-3 * largest))

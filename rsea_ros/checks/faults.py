@@ -8,15 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rsea_ros.checks import frozen as freezes
 from rsea_ros.checks.expected import Side, is_commanded, is_still, sides
-from rsea_ros.checks.frozen import (
-    SMALLEST_SHARE,
-    frozen_samples,
-    held_in_motion,
-    longest,
-    simultaneous_holds,
-    while_others_moved,
-)
 from rsea_ros.checks.pairs import Pair, pairs_of
 from rsea_ros.checks.stamp_findings import rounded_stamps
 from rsea_ros.identification.noise import FEW, step_of
@@ -171,13 +164,13 @@ def _mask(record: Record, name: str) -> tuple[BoolArray, list[Fault]]:
             continue
         marked = find(channel, name) & ~bad
         if kind in _WHILE_MOVING:
-            marked = while_others_moved(record, name, marked, kind)
+            marked = freezes.while_others_moved(record, name, marked, kind)
         if kind == "frozen_samples":
-            marked |= simultaneous_holds(record, name) & ~bad
-            marked |= held_in_motion(record) & ~bad if name == "position" else False
+            marked |= freezes.simultaneous_holds(record, name) & ~bad
+            marked |= freezes.held_in_motion(record) & ~bad if name == "position" else False
         share = np.count_nonzero(marked) / max(len(marked), 1)
-        if share > (SMALLEST_SHARE if kind == "frozen_samples" else 0.0):
-            where = longest(channel, marked) if kind == "frozen_samples" else ""
+        if share > (freezes.SMALLEST_SHARE if kind == "frozen_samples" else 0.0):
+            where = freezes.longest(channel, marked) if kind == "frozen_samples" else ""
             faults.append(Fault(kind, name, share, where))
             bad |= marked
     return bad, faults
@@ -270,7 +263,7 @@ _WHILE_MOVING = ("clipping", "frozen_samples")
 FINDERS: Mapping[str, Callable[[Channel, str], BoolArray]] = {
     "nan": not_finite,
     "clipping": clipping,
-    "frozen_samples": frozen_samples,
+    "frozen_samples": freezes.frozen_samples,
     "outliers": outliers,
 }
 

@@ -85,8 +85,7 @@ def _in_runs(repeat: BoolArray, least: float) -> BoolArray:
     number = np.cumsum(~repeat)
     length = np.bincount(number)
     usual = float(np.quantile(length[length > 0], 0.95))
-    long: BoolArray = length[number] > max(_LONG_RUN * usual, least)
-    return long
+    return np.asarray(length[number] > max(_LONG_RUN * usual, least))
 
 
 def simultaneous_holds(record: Record, name: str) -> BoolArray:
@@ -126,7 +125,11 @@ def while_others_moved(record: Record, name: str, suspect: BoolArray, kind: str)
     that freezes does so in fast and in slow motion alike, a coarse one rather in slow motion.
     """
     if name == "position" and "velocity" in record:
-        suspect = suspect & _went_on(record, suspect)
+        turned, least = _turned(record)
+        far = np.zeros(len(suspect), bool)
+        for first, end in runs_of(suspect):
+            far[first:end] = np.ptp(turned[first:end]) > least
+        suspect = suspect & far
     motion = _motion(record, name, suspect, kind) if suspect.any() else None
     if motion is None or not motion.moved.any():
         return suspect if motion is None else np.zeros(len(suspect), bool)
@@ -138,15 +141,6 @@ def while_others_moved(record: Record, name: str, suspect: BoolArray, kind: str)
     fast = motion.moved & (motion.speed > np.median(motion.speed[motion.moved]))
     share = _MOVED_OF_NOISY if long.any() and _dithers(record[name]) else _MOVED
     return _mostly(long, motion.moved, share) | _mostly(suspect & ~long, fast)
-
-
-def _went_on(record: Record, suspect: BoolArray) -> BoolArray:
-    """Return the samples of runs in which the velocity turned further than a few steps of the position."""
-    turned, least = _turned(record)
-    far = np.zeros(len(suspect), bool)
-    for first, end in runs_of(suspect):
-        far[first:end] = np.ptp(turned[first:end]) > least
-    return far
 
 
 def _turned(record: Record) -> tuple[FloatArray, float]:

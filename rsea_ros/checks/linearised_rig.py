@@ -246,7 +246,16 @@ def linear_of(record: Record, masked: Mapping[str, BoolArray], rig: Rig, known: 
     """
     setting, state = _setting(record, masked, rig, known)
     state, rows, sd, settled = _descend(setting, state)
-    return _linear(setting, state, rows, sd, settled)
+    n, m = len(setting.values), len(setting.timed)
+    late, grows = np.hypot(sd[n : n + m], _RESOLUTION), sd[n + m : n + 2 * m]
+    return LinearisedFit(
+        offset={c: Number(float(state.offset[k]), float(late[k])) for k, c in enumerate(setting.timed)},
+        drift={c: Number(float(state.drift[k]), float(grows[k])) for k, c in enumerate(setting.timed)},
+        misfit=dict(zip(setting.timed, rows.left.misfit.tolist(), strict=True)),
+        settled=settled,
+        problem=rows.left.problem,
+        theta=state.theta,
+    )
 
 
 def _setting(
@@ -287,18 +296,13 @@ def _descend(
             break
         state, rows = better[0], rows_of(setting, better[1], rows.slope)
         step, sd = gauss_newton_step(rows, setting, state)
-        settled = _clocks_stand(setting, step, sd)
+        n, m = len(setting.values), len(setting.timed)
+        finest = np.repeat([_RESOLUTION, _RESOLUTION / setting.case.duration], m)
+        clocks = slice(n, n + 2 * m)
+        settled = bool(np.all(np.abs(step[clocks]) < _DONE * np.hypot(sd[clocks], finest)))
         if settled:
             break
     return state.move(0.5 * step), rows, sd, settled
-
-
-def _clocks_stand(setting: LinearSetting, step: FloatArray, sd: FloatArray) -> bool:
-    """Return whether a step leaves every clock unchanged within its doubt."""
-    n, m = len(setting.values), len(setting.timed)
-    finest = np.repeat([_RESOLUTION, _RESOLUTION / setting.case.duration], m)
-    clocks = slice(n, n + 2 * m)
-    return bool(np.all(np.abs(step[clocks]) < _DONE * np.hypot(sd[clocks], finest)))
 
 
 def _liveliest(record: Record, masked: Mapping[str, BoolArray]) -> tuple[float, float]:
@@ -321,16 +325,3 @@ def _cut(
     """Return record and masks between two instants (s), as they are where that is all of them."""
     inside = {n: (c.t >= begin) & (c.t < end) for n, c in record.channels.items()}
     return record.between(begin, end), {n: masked[n][keep] for n, keep in inside.items() if n in masked}
-
-
-def _linear(
-    setting: LinearSetting, state: LinearState, rows: LinearisedRows, sd: FloatArray, settled: bool
-) -> LinearisedFit:
-    n, m = len(setting.values), len(setting.timed)
-    late, grows = np.hypot(sd[n : n + m], _RESOLUTION), sd[n + m : n + 2 * m]
-    return LinearisedFit(
-        offset={c: Number(float(state.offset[k]), float(late[k])) for k, c in enumerate(setting.timed)},
-        drift={c: Number(float(state.drift[k]), float(grows[k])) for k, c in enumerate(setting.timed)},
-        misfit=dict(zip(setting.timed, rows.left.misfit.tolist(), strict=True)), settled=settled,
-        problem=rows.left.problem, theta=state.theta,
-    )

@@ -408,18 +408,17 @@ _SAYS = {
 def _contradiction(p: Pair) -> Finding:
     """Return the finding of two channels that disagree where no third says which is wrong."""
     law = _SAYS.get((p.law.y, p.law.x), f"what {p.law.x} makes it by the rig's structure")
-    sign = "-" if p.sign < 0 else ""
-    size = f"{sign}{p.factor:.3g} times {law}" if p.sign else f"not {law}"
+    says = f"{'times' if p.sign else 'not'} {law}"
     side = "behind" if p.lag > 0.0 else "ahead of"
     late = f", {1e3 * abs(p.lag):.3g} ms {side} it" if abs(p.lag) > _IN_TIME else ""
     return Finding(
         "amber",
         "contradiction",
         p.law.y,
-        p.factor if p.sign else p.lag,
+        math.copysign(p.factor, p.sign) if p.sign else p.lag,
         "1" if p.sign else "s",
         expected="1, in step",
-        detail=f"{size}{late}, coherence {p.coherence:.2f}, from {p.start:.4g} s to {p.stop:.4g} s",
+        detail=f"{says}{late}, coherence {p.coherence:.2f}, from {p.start:.4g} s to {p.stop:.4g} s",
         remedy=f"nothing says which of {p.law.y} and {p.law.x} is wrong: look at unit and source of both",
     )
 

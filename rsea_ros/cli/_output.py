@@ -8,8 +8,7 @@ from typing import NamedTuple
 
 from rsea_ros.errors import OutputError
 from rsea_ros.model.rig_file import rig_path
-from rsea_ros.outputs.files import unused_path
-from rsea_ros.outputs.new_files import Destination, check_free
+from rsea_ros.outputs.files import Destination, check_free, unused_path
 from rsea_ros.report.result_files import Provenance, provenance_of
 
 

@@ -24,7 +24,7 @@ from rsea_ros.hardware.peer.serial_line import EmulatedBus
 from rsea_ros.hardware.simulated import SimulatedDevice
 from rsea_ros.model.rig import Sensor
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.outputs.new_files import check_free
+from rsea_ros.outputs.files import check_free
 
 HELP = "simulate a bench behind real wires: a motor on a pseudo-terminal and an F/T sensor on UDP"
 EXAMPLE = "rsea bench --rig paper_high_impedance --port bench_tty"

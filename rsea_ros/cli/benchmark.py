@@ -22,7 +22,7 @@ from rsea_ros.cli._output import Action, add_force, path, verb_of
 from rsea_ros.cli._terminal import columns, positive, progress, say, whole_number
 from rsea_ros.errors import BenchmarkError, ParameterError, RseaError
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.outputs.new_files import check_free, write_file
+from rsea_ros.outputs.files import check_free, write_file
 from rsea_ros.progress import Progress
 
 if TYPE_CHECKING:

@@ -16,7 +16,7 @@ from rsea_ros.design.motor_gear_units import catalogue
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.rig import Rig, motor_torque
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.outputs.new_files import NewFiles
+from rsea_ros.outputs.files import NewFiles
 from rsea_ros.report.result_files import CONTROL_JSON, REPORT, json_text
 
 if TYPE_CHECKING:

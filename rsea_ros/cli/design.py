@@ -12,7 +12,7 @@ from rsea_ros.cli._terminal import say
 from rsea_ros.design.mechanism import UNITS, Requirement
 from rsea_ros.design.motor_gear_units import PAPERS, unit_named
 from rsea_ros.model.train import PARTS, TRAINS
-from rsea_ros.outputs.new_files import NewFiles
+from rsea_ros.outputs.files import NewFiles
 from rsea_ros.report import words
 from rsea_ros.report.result_files import DESIGN_JSON, REPORT, json_text
 
@@ -109,9 +109,9 @@ def _print(asked: Any, least: Any, robust: Any, report: Path) -> None:
     if papers := unstated(asked):
         say(f"not stated, so the paper's: {papers}", indent=2)
     for row in by_train(asked.requirement, asked.unit, asked.stiffness):
-        low, high = row.band_range
+        (low, high), turned = row.band_range, row.design.unit
         say(
-            f"  {words.train(row.train)}, n = {row.turns:+.0f}: {row.band:.4g} Hz "
+            f"  {words.train(turned.train)}, n = {turned.turns:+.0f}: {row.design.band_exact:.4g} Hz "
             f"({low:.4g} to {high:.4g} Hz over 90 % of the rotor's inertia), {row.for_band:.0f} N·m/rad for "
             f"{asked.requirement.bandwidth:g} Hz, {row.least:.0f} N·m/rad for all demands",
             indent=4,

@@ -17,7 +17,7 @@ from rsea_ros.documents.units import plain
 from rsea_ros.errors import FieldError, ParameterError
 from rsea_ros.experiment.run_shape import UNITS, limits_from, run_text
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.outputs.new_files import Destination, NewFiles
+from rsea_ros.outputs.files import Destination, NewFiles
 from rsea_ros.report.result_files import COMMANDS, EXPERIMENT, EXPERIMENT_JSON, MODEL, REPORT, json_text
 from rsea_ros.report.words import LABEL
 

@@ -19,7 +19,7 @@ from rsea_ros.errors import FieldError, ParameterError, RigError
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_document import check_effects
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.outputs.new_files import Destination, NewFiles, check_free, write_file
+from rsea_ros.outputs.files import Destination, NewFiles, check_free, write_file
 from rsea_ros.records.record import FloatArray
 from rsea_ros.report.result_files import DIAGNOSIS_JSON, MODEL, pick
 

@@ -12,7 +12,7 @@ from rsea_ros.cli._terminal import say, whole_numbers
 from rsea_ros.cli._topics import add_topic_options, topic_map
 from rsea_ros.cli.maps import map_path
 from rsea_ros.errors import OutputError, ParameterError
-from rsea_ros.outputs.new_files import Destination, NewFiles, check_free, write_file
+from rsea_ros.outputs.files import Destination, NewFiles, check_free, write_file
 
 HELP = "convert a measurement (CSV, MAT, Parquet, NPZ, JSON) to a bag by a map of its columns"
 EXAMPLE = "rsea import run.csv --map map.yaml --out run"

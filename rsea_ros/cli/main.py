@@ -90,14 +90,6 @@ def verbs() -> dict[str, Path]:
     return {f.stem.rstrip("_"): f for f in files if not f.stem.startswith("_") and f.stem != "main"}
 
 
-def overview() -> str:
-    """Return the help text with one line for each verb, without importing the verbs."""
-    rows = [(f"  {name}", summary(path)) for name, path in verbs().items()]
-    closing = "rsea VERB --help shows the arguments of a verb with units, and an example; rsea --version."
-    closing = wrap(closing, _terminal.width())
-    return "\n".join(["usage: rsea VERB …", "", _terminal.columns(rows), "", closing])
-
-
 def summary(path: Path) -> str:
     """Return the HELP string of a verb's file, read from its syntax tree."""
     for node in ast.parse(path.read_text(encoding="utf-8")).body:
@@ -112,7 +104,10 @@ def summary(path: Path) -> str:
 def _call(name: str, arguments: Sequence[str]) -> int:
     """Run a verb, or print the overview. Raises ParameterError for an unknown verb."""
     if name in _HELP:
-        print(overview())
+        rows = [(f"  {name}", summary(path)) for name, path in verbs().items()]
+        closing = "rsea VERB --help shows the arguments of a verb with units, and an example; rsea --version."
+        closing = wrap(closing, _terminal.width())
+        print("\n".join(["usage: rsea VERB …", "", _terminal.columns(rows), "", closing]))
         return SUCCESS
     if name == _VERSION:
         from rsea_ros.version import version

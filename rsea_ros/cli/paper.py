@@ -10,7 +10,7 @@ from rsea_ros.cli._output import add_json, add_results, path, print_file, result
 from rsea_ros.cli._terminal import progress, whole_number
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.outputs.new_files import Destination, NewFiles, check_free
+from rsea_ros.outputs.files import Destination, NewFiles, check_free
 from rsea_ros.records.record import Channel, Record
 from rsea_ros.report.result_files import PAPER_JSON, REPORT, json_text
 

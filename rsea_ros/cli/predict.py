@@ -2,7 +2,6 @@
 
 import argparse
 import json
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import NoReturn
@@ -13,9 +12,9 @@ from msg_adapters import read_record
 from rsea_ros.cli._output import add_force
 from rsea_ros.cli._topics import add_topic_options, cut, topic_map
 from rsea_ros.errors import ParameterError
-from rsea_ros.model.prediction_errors import Comparison, predict
+from rsea_ros.model.prediction_errors import predict
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.outputs.new_files import check_free, write_file
+from rsea_ros.outputs.files import check_free, write_file
 from rsea_ros.records.stamps import repair_stamps
 from rsea_ros.report.result_files import fault_json, pick
 
@@ -62,17 +61,12 @@ def run(args: argparse.Namespace) -> int:
 
     comparisons = predict(rig, record)
     if args.out:
-        write_file(args.out, _table(comparisons), force=args.force)
+        t = next(iter(comparisons.values())).t
+        columns = [np.interp(t, c.t, c.predicted).tolist() for c in comparisons.values()]
+        rows = (",".join(map(repr, row)) for row in zip(t.tolist(), *columns, strict=True))
+        write_file(args.out, "\r\n".join([",".join(["t", *comparisons]), *rows, ""]), force=args.force)
     errors = {n: pick(c, "rms_error fit_percent") for n, c in comparisons.items()}
     with np.errstate(all="ignore"):
         faults_json = [fault_json(fault) for fault in check_record(record, rig, args.axis).faults]
     print(json.dumps({"channels": errors, "data": {"faults": faults_json}}, indent=2))
     return 0
-
-
-def _table(comparisons: Mapping[str, Comparison]) -> str:
-    """Return CSV with one row per stamp of the first channel; other channels are interpolated to it."""
-    t = next(iter(comparisons.values())).t
-    columns = [np.interp(t, c.t, c.predicted).tolist() for c in comparisons.values()]
-    rows = (",".join(map(repr, row)) for row in zip(t.tolist(), *columns, strict=True))
-    return "\r\n".join([",".join(["t", *comparisons]), *rows, ""])

@@ -10,8 +10,8 @@ from rsea_ros.documents.units import plain
 from rsea_ros.documents.wording import list_names
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.rig import END_NAMES, Rig
-from rsea_ros.model.rig_file import load_rig, rig_folders
-from rsea_ros.outputs.new_files import check_free, write_file
+from rsea_ros.model.rig_file import load_rig, packaged
+from rsea_ros.outputs.files import check_free, write_file
 
 HELP = "start a rig for your bench (new), or check a rig and show its values (check)"
 EXAMPLE = "rsea rig new my_bench && rsea rig check my_bench.yaml"
@@ -34,7 +34,7 @@ def run(args: argparse.Namespace) -> int:
 def _new(args: argparse.Namespace) -> int:
     if not args.name.isidentifier():
         raise ParameterError(f"name {args.name!r}, expected letters, digits and _, such as left_knee")
-    template = next(folder.parent / "templates" / "rig.yaml" for folder in rig_folders())
+    template = packaged("template", "rig", "templates", ParameterError)
     out = args.out or Path(f"{args.name}.yaml")
     check_free([out], force=args.force)
     write_file(out, template.read_text(encoding="utf-8").replace("NAME", args.name), force=args.force)

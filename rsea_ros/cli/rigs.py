@@ -13,9 +13,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    from rsea_ros.model.rig_file import load_rig, rig_names
+    from rsea_ros.model.rig_file import load_rig, packaged_names
 
-    print(columns([(name, load_rig(name).about) for name in rig_names()]))
+    print(columns([(name, load_rig(name).about) for name in packaged_names()]))
     print()
     say("rsea rig check NAME shows the values of a rig; rsea rig new NAME starts a new one.")
     return 0

@@ -19,7 +19,7 @@ from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_document import check_effects
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
-from rsea_ros.outputs.new_files import check_free
+from rsea_ros.outputs.files import check_free
 from rsea_ros.records.record import Channel
 
 HELP = "simulate a rig and write a bag, with any effect of the catalogue switched on"

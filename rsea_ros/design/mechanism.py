@@ -16,7 +16,7 @@ from rsea_ros.errors import ParameterError
 from rsea_ros.records.record import FloatArray
 
 _LARGEST = 45.0
-_RANGE = (1e-9, 1e6)
+RANGE = (1e-9, 1e6)
 """SI: beyond it nothing of this kind has ever been built, and numbers fail."""
 
 
@@ -75,9 +75,9 @@ UNITS = {
 
 def check_magnitude(name: str, value: float, unit: str) -> None:
     """Raise ParameterError for a value that is not finite and positive, or of no possible size."""
-    if not _RANGE[0] <= value <= _RANGE[1]:
+    if not RANGE[0] <= value <= RANGE[1]:
         unit = plain(unit)
-        raise ParameterError(f"{name} = {value:g} {unit}, expected {_RANGE[0]:g} to {_RANGE[1]:g} {unit}")
+        raise ParameterError(f"{name} = {value:g} {unit}, expected {RANGE[0]:g} to {RANGE[1]:g} {unit}")
 
 
 Values = float | FloatArray

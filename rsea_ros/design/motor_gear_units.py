@@ -17,10 +17,9 @@ from rsea_ros.documents.strict_yaml import mapping, number, only_keys, sequence,
 from rsea_ros.documents.units import plain
 from rsea_ros.documents.wording import did_you_mean, quote
 from rsea_ros.errors import FieldError, ParameterError
-from rsea_ros.model.rig_file import rig_folders
+from rsea_ros.model.rig_file import packaged
 from rsea_ros.model.train import TRAINS, Part, Train, rotor_turns, spin_inertia
 
-FILE = "motor_gear_units.yaml"
 UNITS: Mapping[str, str] = {
     "ratio": "1",
     "continuous_torque": "N m",
@@ -90,8 +89,9 @@ class MotorGear:
 
 def catalogue(path: Path | None = None) -> dict[str, MotorGear]:
     """Return the units by name. Raises ParameterError naming file, field, value and the expected value."""
+    path = path or packaged("catalogue", "motor_gear_units", "design", ParameterError)
     return strict_yaml.load(
-        path or _default_path(), "a catalogue in YAML", lambda message, field: ParameterError(message),
+        path, "a catalogue in YAML", lambda message, field: ParameterError(message),
         lambda held: {str(n): _unit(str(n), body) for n, body in mapping(held, "catalogue").items()},
     )  # fmt: skip
 
@@ -102,11 +102,6 @@ def unit_named(name: str, path: Path | None = None) -> MotorGear:
     if name not in units:
         raise ParameterError(f"unit {name!r}, expected one of {', '.join(units)}{did_you_mean(name, units)}")
     return units[name]
-
-
-def _default_path() -> Path:
-    folders = [folder.parent / "design" for folder in rig_folders()]
-    return next((f / FILE for f in folders if (f / FILE).exists()), folders[0] / FILE)
 
 
 def _unit(name: str, item: Any) -> MotorGear:

@@ -70,19 +70,17 @@ def mesh_of(rig: Rig) -> Mesh:
         what = f"rig {rig.name}: beside_spring = {rig.beside_spring}"
         raise RigError(f"{what} cannot be exported, expected chassis", "beside_spring")
     ratio = rig["gear.ratio"]
-    match rig.train:
-        case "planetary":
-            return Mesh("output", ("rotor", "housing"), (1.0, ratio - 1.0), internal=False)
-        case "star":
-            return Mesh("housing", ("rotor", "output"), (1.0, ratio - 1.0), internal=False)
-        case "harmonic_circular_spline_held":
-            return Mesh("rotor", ("output", "housing"), (2.0 * ratio, 2.0 * ratio + 2.0), internal=True)
-        case "harmonic_flexspline_held":
-            return Mesh("rotor", ("housing", "output"), (2.0 * ratio, 2.0 * ratio + 2.0), internal=True)
-        case "spur":
-            return Mesh("housing", ("rotor", "output"), (1.0, ratio), internal=False)
-        case _:
-            raise RigError(f"rig {rig.name}: the lumped train cannot be exported, expected a real train")
+    splines, planets = (2.0 * ratio, 2.0 * ratio + 2.0), (1.0, ratio - 1.0)
+    meshes = {
+        "planetary": Mesh("output", ("rotor", "housing"), planets, internal=False),
+        "star": Mesh("housing", ("rotor", "output"), planets, internal=False),
+        "harmonic_circular_spline_held": Mesh("rotor", ("output", "housing"), splines, internal=True),
+        "harmonic_flexspline_held": Mesh("rotor", ("housing", "output"), splines, internal=True),
+        "spur": Mesh("housing", ("rotor", "output"), (1.0, ratio), internal=False),
+    }
+    if rig.train not in meshes:
+        raise RigError(f"rig {rig.name}: the lumped train cannot be exported, expected a real train")
+    return meshes[rig.train]
 
 
 STEP = 5e-5
@@ -101,11 +99,6 @@ _LENGTH = {"housing_end": 0.4, "spring_end": -0.4}
 """m, of the drawn links: thigh up, shank down."""
 
 
-def mjcf(rig: Rig) -> str:
-    """Return the model. Raises RigError for a rig that is lumped, has a rigid spring or a massless part."""
-    return text(model_element(rig))
-
-
 def text(root: xml.Element) -> str:
     """Return a model as the text of its file."""
     xml.indent(root)
@@ -113,7 +106,10 @@ def text(root: xml.Element) -> str:
 
 
 def model_element(rig: Rig, play: float = 0.0) -> xml.Element:
-    """Return the model as XML. play: whole width between gear output and chassis, rad. Raises as `mjcf`."""
+    """Return the model as XML. play: whole width between gear output and chassis, rad.
+
+    Raises RigError for a rig that is lumped, has a rigid spring or a massless part.
+    """
     if rig.rigid_spring:
         raise RigError(f"rig {rig.name}: a rigid spring cannot be exported, expected a spring")
     mesh = mesh_of(rig)
@@ -124,18 +120,13 @@ def model_element(rig: Rig, play: float = 0.0) -> xml.Element:
     is_stiff = math.isinf(rig["gear.stiffness"]) and not play
     parents = _bodies(rig, mesh, xml.SubElement(root, "worldbody"), is_stiff)
     _join(rig, mesh, parents, root, play)
-    _sensors(root)
-    return root
-
-
-def _sensors(root: xml.Element) -> None:
-    """Add the sensors: angle and speed of the output against the housing, and of the springs."""
     sensors = xml.SubElement(root, "sensor")
     tendons = {one.get("name", "") for one in root.iter("fixed")}
     for tendon, name in SENSED.items():
         if tendon in tendons and not (tendon == "motor" and "encoder" in tendons):
             xml.SubElement(sensors, "tendonpos", name=name, tendon=tendon)
             xml.SubElement(sensors, "tendonvel", name=f"{name}_rate", tendon=tendon)
+    return root
 
 
 def _bodies(rig: Rig, mesh: Mesh, world: xml.Element, is_stiff: bool) -> Mapping[str, str | None]:
@@ -231,10 +222,8 @@ def _join(
         _teeth(root, tendons, mesh)
     elif play:
         flanks = tie("play", _sum(output, {"chassis": -1.0}))
-        flanks.set("range", f"{-0.5 * play!r} {0.5 * play!r}")
-        flanks.set("limited", "true")
-        flanks.set("solreflimit", SOLREF)
-        flanks.set("solimplimit", SOLIMP)
+        limits = {"solreflimit": SOLREF, "solimplimit": SOLIMP}
+        flanks.attrib |= {"range": f"{-0.5 * play!r} {0.5 * play!r}", "limited": "true", **limits}
     else:
         tie("gear", _sum(output, {"chassis": -1.0}), *_spring(rig, "gear"))
         tie("encoder", {"chassis": 1.0, "housing": -1.0})

@@ -12,9 +12,9 @@ import numpy as np
 from rsea_ros.design import mechanism
 from rsea_ros.design.mechanism import Requirement, spring_rate
 from rsea_ros.design.motor_gear_units import MotorGear
+from rsea_ros.errors import ParameterError
 from rsea_ros.model import transfer
 from rsea_ros.model.rig import END_NAMES, Quantity, Rig
-from rsea_ros.model.train import Train
 from rsea_ros.records.statistics import Z90
 
 DAMPING_RATIO = 0.025
@@ -140,8 +140,15 @@ def bisect(reaches: Callable[[float], bool], low: float, high: float, rounds: in
 
 
 def least_stiffness(requirement: Requirement, unit: MotorGear) -> float:
-    """Return the least K_s, N m/rad, that meets every demand on the spring."""
-    return max(stiffness_bounds(requirement, unit).values())
+    """Return the least K_s, N m/rad, that meets every demand on the spring.
+
+    Raises ParameterError for a demand that no spring of a possible size meets.
+    """
+    demand, least = max(stiffness_bounds(requirement, unit).items(), key=lambda item: item[1])
+    if least > mechanism.RANGE[1]:
+        most = f"expected one that a spring of {mechanism.RANGE[1]:g} N·m/rad meets"
+        raise ParameterError(f"demand “{demand}” asks for a spring of {least:.3g} N·m/rad, {most}")
+    return least
 
 
 def rig_of(requirement: Requirement, unit: MotorGear, stiffness: float) -> Rig:
@@ -173,15 +180,11 @@ _STEPS = 201
 class WithTrain:
     """A design with one train.
 
-    turns: n. inner: J_sc + n J_r, kg m^2. band: of the stiffness judged, Hz, exact. band_range: the same
-    over 90 % of the rotor's inertia. for_band, least: the least K_s, N m/rad, for the bandwidth and for all
-    demands.
+    band_range: Hz, exact, over 90 % of the rotor's inertia. for_band, least: the least K_s, N m/rad, for the
+    bandwidth and for all demands.
     """
 
-    train: Train
-    turns: float
-    inner: float
-    band: float
+    design: SpringDesign
     band_range: tuple[float, float]
     for_band: float
     least: float
@@ -189,19 +192,14 @@ class WithTrain:
 
 def by_train(requirement: Requirement, unit: MotorGear, stiffness: float) -> tuple[WithTrain, ...]:
     """Return a design of this stiffness, N m/rad, with each train that the unit may have."""
-    return tuple(_with_train(requirement, unit.with_train(train), stiffness) for train in unit.trains)
-
-
-def _with_train(r: Requirement, unit: MotorGear, stiffness: float) -> WithTrain:
-    design = spring_design(r, unit, stiffness)
-    return WithTrain(
-        train=unit.train,
-        turns=unit.turns,
-        inner=design.inner,
-        band=design.band_exact,
-        band_range=band_range(stiffness, r.inertia, unit.spin, unit.rotor_spread),
-        for_band=least_for_band(r, unit),
-        least=least_stiffness(r, unit),
+    return tuple(
+        WithTrain(
+            spring_design(requirement, turned, stiffness),
+            band_range(stiffness, requirement.inertia, turned.spin, turned.rotor_spread),
+            least_for_band(requirement, turned),
+            max(stiffness_bounds(requirement, turned).values()),
+        )
+        for turned in map(unit.with_train, unit.trains)
     )
 
 
@@ -219,7 +217,7 @@ def band_range(stiffness: float, chassis: float, spin: float, spread: float) -> 
 
 def sense_unknown(rows: Sequence[WithTrain]) -> bool:
     """Return whether the trains differ in the sign of the rotor's spin."""
-    return len({row.turns > 0.0 for row in rows}) > 1
+    return len({row.design.unit.turns > 0.0 for row in rows}) > 1
 
 
 SPREADS = {"rate": 0.05, "arm": 0.005, "spring_radius": 0.04, "inertia": 0.05, "motor": 0.05}

@@ -205,7 +205,7 @@ def _settings(
     rate = playable_rate(rate)
     return ExcitationSettings(
         rate=rate, duration=rule.duration, amplitude=0.5, noise=0.2 if option.kind == "chirp" else 0.0,
-        low=option.low, high=min(option.high, 0.45 * rate), period=4.0, seed=7,
+        low=option.low, high=min(option.high, 0.45 * rate), period=min(4.0, rule.duration), seed=7,
     )  # fmt: skip
 
 

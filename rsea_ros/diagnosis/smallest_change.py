@@ -16,7 +16,7 @@ from rsea_ros.checks.faults import check
 from rsea_ros.diagnosis.diagnose import nominal_problem, searched_effects
 from rsea_ros.diagnosis.result import Diagnosis, SmallestChange
 from rsea_ros.effects.effect import Effect, Parameter
-from rsea_ros.errors import RseaError
+from rsea_ros.errors import ParameterError, RseaError
 from rsea_ros.identification.fit import add_effect
 from rsea_ros.identification.problem import Problem
 from rsea_ros.identification.solver import jacobian, solve, worker_pools
@@ -88,16 +88,16 @@ def _smallest(effect: Effect, model: _Model, limit: float) -> SmallestChange | N
     def added(share: float) -> tuple[Problem, FloatArray]:
         return add_effect(model.problem, model.theta, effect, of_size(effect, size, share))
 
-    try:
-        tiny, theta = added(_SPAN[0])
-        without = tiny.residual(theta)
-    except RseaError:
-        return None
+    # a lag reads the current otherwise, however short
+    without, at = added(_SPAN[0]) if is_time else (model.problem, model.theta)
+    before = without.residual(at)
     for k in range(_ROUNDS):
         parameters = of_size(effect, size, share)
         try:
             problem, theta = added(share)
-            power = model.shown(problem.residual(theta) - without, by_clocks=not is_time) ** 2 - 1.0
+            power = model.shown(problem.residual(theta) - before, by_clocks=not is_time) ** 2 - 1.0
+        except ParameterError:
+            return None
         except RseaError:
             power = math.inf
         value, wanted = parameters[size.name], limit**2 - 1.0

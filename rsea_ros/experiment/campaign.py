@@ -266,15 +266,22 @@ class Campaign:
     def _hopeless_end(
         self, session: _Session, possible: Sequence[Hypothesis], proposal: Proposal, is_test: bool
     ) -> CampaignOutcome | None:
-        """Return the outcome where no run within the limits would help, None where this one may."""
+        """Return the outcome where no run within the limits would help, None where this one may.
+
+        It is a shared name if all causes that remain contain one.
+        """
         may_help = self._may_show if is_test else self._is_worth
         if may_help(proposal, session.played):
             return None
         proofs = proofs_of(possible, proposal.hopeless, self.asked, session.noise, self.run)
         is_covered = any(p.covers_all and possible[0].name in p.pair for p in proofs)
-        if is_test or is_covered or self._played_longest(session.played):
-            return self._undecidable(session, possible, proofs)
-        return None
+        if not (is_test or is_covered or self._played_longest(session.played)):
+            return None
+        first, likely = possible[0].name, self.rules.likely
+        remain = [h for h in possible if h.name == first or h.addition is not None or h.probability >= likely]
+        asked = replace(self.asked, test=self.rules.shown)
+        shared = shared_name(remain, asked, session.noise, self.run)
+        return session.conclude("undecidable", proofs, shared=shared)
 
     def known_end(self, weighing: RunWeighing) -> End | None:
         """Return the outcome by present knowledge, None where the loop continues."""
@@ -306,25 +313,12 @@ class Campaign:
         chance = max(proposal.chances[1:])
         return chance >= self.rules.shown or (chance >= self.rules.worth and not self._played_longest(played))
 
-    def _undecidable(
-        self, session: _Session, possible: Sequence[Hypothesis], proofs: tuple[Proof, ...]
-    ) -> CampaignOutcome:
-        """Return the outcome where no run separates more: a shared name if all that remain contain one."""
-        first, likely = possible[0].name, self.rules.likely
-        remain = [h for h in possible if h.name == first or h.addition is not None or h.probability >= likely]
-        asked = replace(self.asked, test=self.rules.shown)
-        shared = shared_name(remain, asked, session.noise, self.run)
-        return session.conclude("undecidable", proofs, shared=shared)
-
     def _is_worth(self, proposal: Proposal, played: Sequence[Proposal]) -> bool:
-        """Return whether a run may decide, or lessens the doubt that holds larger ones back."""
-        return proposal.resolved >= self.rules.worth or self._widens(proposal, played)
-
-    def _widens(self, proposal: Proposal, played: Sequence[Proposal]) -> bool:
-        """Return whether a run is the largest so far and only doubt holds it back: it lessens the doubt."""
+        """Return whether a run may decide, or is the largest yet and lessens the doubt that holds it back."""
         before, now = max((p.peaks.at_level["torque"] for p in played), default=0.0), proposal.peaks
         is_larger = now.at_level["torque"] > self.rules.larger * before
-        return is_larger and largest_share(now.expected, self.asked.limits) < self.rules.held_back
+        widens = is_larger and largest_share(now.expected, self.asked.limits) < self.rules.held_back
+        return proposal.resolved >= self.rules.worth or widens
 
     def _played_longest(self, played: Sequence[Proposal]) -> bool:
         """Return whether a run of the longest length was played, to a tenth."""

@@ -36,7 +36,17 @@ def export_isaac(rig: Rig) -> others.Export:
     left |= others.omitted_effects(rig, says, f"{kind} has no field for it")
     terms = ("k_i", "k_f", "k_vi", "sample_time", "velocity_limit")
     left |= others.omitted_terms(rig, dict.fromkeys(terms, "the PD law has no place for it"))
-    return others.Export("isaac", ".py", _file(rig, kind, fields, delay, says, left), says, left)
+    lines = [f'"""Actuator of {in_docstring(rig.name)}, written by rsea export --isaac.', ""]
+    lines += [in_docstring(line) for line in others.coverage_lines(says, left)]
+    lines += ['"""', "", f"from isaaclab.actuators import {kind}", ""]
+    if kind == "DelayedPDActuatorCfg":
+        step = f"PHYSICS_STEP = {PHYSICS_STEP!r}  # s, of your SimulationCfg"
+        lines += [step, f"DELAY = {delay!r}  # s", ""]
+    lines += [f"ACTUATOR = {kind}(", '    joint_names_expr=[".*"],  # the joints of this kind']
+    lines += [f"    {name}={value!r}," for name, value in fields.items()]
+    if kind == "DelayedPDActuatorCfg":
+        lines += [f"    {end}_delay=round(DELAY / PHYSICS_STEP)," for end in ("min", "max")]
+    return others.Export("isaac", ".py", "\n".join([*lines, ")", ""]), says, left)
 
 
 def _loop(rig: Rig, says: dict[str, str]) -> dict[str, float]:
@@ -62,21 +72,3 @@ def _limits(rig: Rig, effects: Mapping[str, Mapping[str, float]], says: dict[str
         says["torque_saturation"] = "effort_limit"
     limit = min(others.command_limit(rig), effects.get("torque_saturation", {}).get("limit", math.inf))
     return {"effort_limit": limit} if math.isfinite(limit) else {}
-
-
-def _file(
-    rig: Rig, kind: str, fields: Mapping[str, float], delay: float, says: Mapping[str, str],
-    left: Mapping[str, str],
-) -> str:  # fmt: skip
-    """Return the Python file."""
-    lines = [f'"""Actuator of {in_docstring(rig.name)}, written by rsea export --isaac.', ""]
-    lines += [in_docstring(line) for line in others.coverage_lines(says, left)]
-    lines += ['"""', "", f"from isaaclab.actuators import {kind}", ""]
-    if kind == "DelayedPDActuatorCfg":
-        step = f"PHYSICS_STEP = {PHYSICS_STEP!r}  # s, of your SimulationCfg"
-        lines += [step, f"DELAY = {delay!r}  # s", ""]
-    lines += [f"ACTUATOR = {kind}(", '    joint_names_expr=[".*"],  # the joints of this kind']
-    lines += [f"    {name}={value!r}," for name, value in fields.items()]
-    if kind == "DelayedPDActuatorCfg":
-        lines += [f"    {end}_delay=round(DELAY / PHYSICS_STEP)," for end in ("min", "max")]
-    return "\n".join([*lines, ")", ""])

@@ -1,6 +1,7 @@
 """A fleet over months: many bags of many joints become rows of one Parquet store, on Dask or without it.
 
 `history` and `recordings` read a store as columns; `rsea fleet` is the command line.
+Raises FleetError where a package of the extra `fleet` is not installed.
 """
 
 from importlib import import_module
@@ -12,7 +13,7 @@ from rsea_ros.errors import FieldError, RseaError
 if TYPE_CHECKING:
     from rsea_ros.fleet.query import history, recordings
 
-__all__ = ["FleetError", "JointMapError", "history", "need_extra", "recordings"]
+__all__ = ["FleetError", "JointMapError", "history", "recordings"]
 
 PACKAGES = ("pyarrow", "duckdb", "fsspec", "dask", "distributed")
 
@@ -25,16 +26,12 @@ class JointMapError(FieldError):
     """A joint map with a missing, unknown or impossible value."""
 
 
-def need_extra() -> None:
-    """Raise FleetError where a package of the extra `fleet` is not installed."""
-    missing = [name for name in PACKAGES if find_spec(name) is None]
-    if missing:
-        install = "pip install 'rsea_ros[fleet]'"
-        raise FleetError(f"{', '.join(missing)}: not installed, expected for rsea fleet: {install}")
+if missing := [name for name in PACKAGES if find_spec(name) is None]:
+    install = "pip install 'rsea_ros[fleet]'"
+    raise FleetError(f"{', '.join(missing)}: not installed, expected for rsea fleet: {install}")
 
 
 def __getattr__(name: str) -> Any:
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    need_extra()
     return getattr(import_module("rsea_ros.fleet.query"), name)

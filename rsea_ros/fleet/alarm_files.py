@@ -14,8 +14,7 @@ from typing import Any
 from rsea_ros.errors import OutputError
 from rsea_ros.fleet.query import NoRowsError, history, recordings
 from rsea_ros.fleet.store import Store
-from rsea_ros.outputs.files import make_folder
-from rsea_ros.outputs.new_files import write_file
+from rsea_ros.outputs.files import make_folder, write_file
 from rsea_ros.report.fleet.words import sentence
 from rsea_ros.trends import Alarm, alarms
 

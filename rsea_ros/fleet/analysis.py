@@ -23,7 +23,7 @@ from rsea_ros.documents import strict_yaml
 from rsea_ros.documents.units import with_unit
 from rsea_ros.errors import RseaError
 from rsea_ros.fleet.joints import MappedJoint, date_in
-from rsea_ros.fleet.row import Row
+from rsea_ros.fleet.store import Row
 from rsea_ros.identification.identify import identify
 from rsea_ros.identification.result import ParameterEstimate
 from rsea_ros.model.extent import bound_values, check_pace

@@ -17,7 +17,7 @@ from rsea_ros.documents.strict_yaml import NEEDED, Key, mapping, names, only_key
 from rsea_ros.documents.wording import quote
 from rsea_ros.errors import FieldError, RseaError
 from rsea_ros.fleet import JointMapError
-from rsea_ros.model.rig_file import load_rig, rig_folders, rig_text
+from rsea_ros.model.rig_file import load_rig, packaged, rig_text
 
 MAP = (
     Key("joints", "mapping", NEEDED, "a mapping for each joint; names have letters, digits, `_ - .`"),
@@ -169,12 +169,9 @@ def _table(body: Mapping[str, Any], field: str, folder: Path) -> ImportMap | Non
     name = text(body["import"], field)
     if "bags" not in body:
         raise FieldError(f"{field} = {quote(name)}: expected bags too, which tables hold this joint", field)
-    shipped = [place.parent / "imports" / f"{name}.yaml" for place in rig_folders()]
-    file = next((path for path in (folder / name, *shipped) if path.is_file()), None)
-    if file is None:
-        raise FieldError(f"{field} = {quote(name)}, expected a map of config/imports or a file", field)
+    beside = folder / name
     try:
-        return load_map(file)
+        return load_map(beside if beside.is_file() else packaged("map", name, "imports", RseaError))
     except RseaError as error:
         raise FieldError(f"{field}: {error}", field) from None
 

@@ -11,8 +11,7 @@ import numpy.typing as npt
 import pyarrow as pa
 
 from rsea_ros.fleet import FleetError
-from rsea_ros.fleet.row import ARROW, EXPECTED_FILES
-from rsea_ros.fleet.store import Store, open_store
+from rsea_ros.fleet.store import ARROW, EXPECTED_FILES, Store, open_store
 
 _ANALYSES = """
 CREATE VIEW analyses AS SELECT * FROM (

@@ -21,9 +21,8 @@ from pathlib import Path
 from rsea_ros.documents.wording import brief
 from rsea_ros.errors import RseaError
 from rsea_ros.fleet.joints import MappedJoint
-from rsea_ros.fleet.row import Row, empty, key_of
 from rsea_ros.fleet.sources import Bag, fingerprint, local_copy, relist
-from rsea_ros.fleet.store import Store, TaskOutcome
+from rsea_ros.fleet.store import Row, Store, TaskOutcome, empty, key_of
 from rsea_ros.identification.solver import on_cores
 from rsea_ros.version import version
 

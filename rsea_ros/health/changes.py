@@ -12,8 +12,6 @@ An unsure one is reported with its probability and fitted again with more looks:
 flank is a shifted zero until the torque changes its sign.
 """
 
-from __future__ import annotations
-
 import math
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -24,14 +22,14 @@ import numpy as np
 from rsea_ros.health import hypotheses as hypo
 from rsea_ros.health.health_finding import UNEXPLAINED, HealthFinding, WatchSettings
 from rsea_ros.health.recursive_estimates import Cusum, Estimates, Scatter, threshold
+from rsea_ros.model.observer.assemble import Noise
 from rsea_ros.model.observer.log import BatchObserver
-from rsea_ros.model.observer.signal_noise import Noise
 from rsea_ros.model.rig import Rig
 from rsea_ros.records.record import FloatArray
 from rsea_ros.records.statistics import Z95
 
 FREEDOM = 4.0
-WHITE = 2.5 * 0.19366
+WHITE = 0.48438
 """Mean cost of an innovation of variance 1: 2.5 E log(1 + z^2 / 4), z normal."""
 ROUNDS, SHORTEST = 8, 0.02
 """Steps of Gauss-Newton; a step so small beside its own sigma, or beside `least`, is the last."""

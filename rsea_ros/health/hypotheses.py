@@ -17,8 +17,8 @@ from typing import NamedTuple
 import numpy as np
 
 from rsea_ros.effects.catalogue import effect_named
+from rsea_ros.model.observer.assemble import Noise
 from rsea_ros.model.observer.log import COMMAND, FT, STATE, BatchObserver
-from rsea_ros.model.observer.signal_noise import Noise
 from rsea_ros.model.rig import EffectSetting, Rig
 from rsea_ros.records.record import FloatArray, IntArray
 from rsea_ros.records.statistics import Z95

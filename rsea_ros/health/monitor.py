@@ -19,8 +19,8 @@ from rsea_ros.health import hypotheses as hypo
 from rsea_ros.health.changes import CandidateCauses, Changes
 from rsea_ros.health.health_finding import HealthFinding, Sensors, WatchSettings, sensor_findings
 from rsea_ros.health.recursive_estimates import ChangeEstimate, scatter_of
+from rsea_ros.model.observer.assemble import Noise
 from rsea_ros.model.observer.log import STATE
-from rsea_ros.model.observer.signal_noise import Noise
 from rsea_ros.model.rig import Rig
 from rsea_ros.records.record import FloatArray, IntArray
 from rsea_ros.records.statistics import Z95

@@ -40,8 +40,8 @@ def body_of(law: laws.Law) -> list[str]:
         if s:
             expression = _with_letter(expression, "a", f"p[{index[s]}]")
         if part.term.memory:
-            made, state = _memory(part, f"m{at}", f"p[{index[s]}]", state)
-            lines += made
+            lines += _memory(part, f"m{at}", f"p[{index[s]}]", state)
+            state += _STATES[part.term.memory]
             expression = _with_letter(expression, "m", f"m{at}")
             at += 1
         (sizes if part.term.friction else smooth).append(f"p[{index[c]}] * ({expression})")
@@ -106,27 +106,31 @@ def _with_letter(expression: str, letter: str, replaced: str) -> str:
     return re.sub(rf"\b{letter}\b", replaced, expression)
 
 
-def _memory(part: laws.FittedTerm, name: str, shape: str, state: int) -> tuple[list[str], int]:
-    """Return the lines that keep a memory in the states from `state` on, and the next free one."""
+_STATES = {"": 0, "lag": 1, "heat": 1, "delay": RING + 1, "dahl": 2, "play": 2, "ring": 2}
+"""How many states each memory takes."""
+
+
+def _memory(part: laws.FittedTerm, name: str, shape: str, state: int) -> list[str]:
+    """Return the lines that keep a memory in the states from `state` on."""
     of, kind = part.term.remembers, part.term.memory
     if kind in ("lag", "heat"):
         value = f"{of} * {of}" if kind == "heat" else of
         kept = f"x[{state}] = lagged(x[{state}], {value}, s[STEP], {shape})"
-        return [kept, f"{name} = x[{state}]"], state + 1
+        return [kept, f"{name} = x[{state}]"]
     if kind == "ring":
         zeta = part.term.constant
         rung = f"{name} = rung(x, {state}, {of}, s[STEP], {shape}, {zeta:g})"
         if part.term.place == "spring":  # called twice a step; only the second may change a state
-            return [f"{name} = x[{state}]", "if s[COMMIT] == 1.0:", f"    {rung}"], state + 2
-        return [rung], state + 2
+            return [f"{name} = x[{state}]", "if s[COMMIT] == 1.0:", f"    {rung}"]
+        return [rung]
     if kind == "delay":
-        return [f"{name} = from_ring(x, {state}, {of}, {shape} / s[STEP])"], state + RING + 1
+        return [f"{name} = from_ring(x, {state}, {of}, {shape} / s[STEP])"]
     made = f"played(x[{state}], {of}, {shape})"
     if kind == "dahl":
         made = f"bent(x[{state}], {of} - x[{state + 1}], {shape})"
     keep = f"x[{state}], x[{state + 1}] = {name}, {of}"
     at_commit = ["if s[COMMIT] == 1.0:", f"    {keep}"] if part.term.place == "spring" else [keep]
-    return [f"{name} = {made}", *at_commit], state + 2
+    return [f"{name} = {made}", *at_commit]
 
 
 _WIDE = 10.0
@@ -207,8 +211,8 @@ def _effect(law: laws.Law, claims: Claims) -> str:
     reads = [laws.READS[n] for n in laws.READS if n in letters] + ["DISTAL_ANGLE"] * ("h" in letters)
     reading = f"    reads=({', '.join(reads)},),\n" if reads else ""
     exponent = claims.amplitude_exponent
-    kept = {"": 0, "lag": 1, "heat": 1, "delay": RING + 1, "dahl": 2, "play": 2, "ring": 2}
-    states = int(law.is_friction) + sum(kept[p.term.memory] for p in law.parts) + 2 * (law.place == "encoder")
+    kept = sum(_STATES[part.term.memory] for part in law.parts)
+    states = int(law.is_friction) + kept + 2 * (law.place == "encoder")
     return (
         f'EFFECT = Effect(\n    name="{law.name}",\n    port=Port.{port},\n    parameters=(\n{rows}    ),\n'
         f'    claims=Claims("{claims.channel}", "{claims.parity}", amplitude_exponent={exponent}, '

@@ -139,15 +139,11 @@ def equation_of(law: Law) -> str:
         text = part.term.equation.format(a=s) if s else part.term.equation
         if s and s not in text:
             text += f" with {s}"
-        terms.append(_signed_text(c, text, minus=part.term.friction))
+        bare = text.removeprefix("-")
+        sign = "-" if part.term.friction or bare != text else ""
+        terms.append(f"{sign}{c}" if bare == "1" else f"{sign}{c} · {bare}")
     tail = ", smooth below creep_velocity" if law.is_friction else ""
     return f"{left} = {' + '.join(terms).replace('+ -', '- ')}{tail}"
-
-
-def _signed_text(coefficient: str, text: str, *, minus: bool) -> str:
-    bare = text.removeprefix("-")
-    sign = "-" if minus or bare != text else ""
-    return f"{sign}{coefficient}" if bare == "1" else f"{sign}{coefficient} · {bare}"
 
 
 def about_of(law: Law) -> str:

@@ -106,20 +106,16 @@ def bends(values, angle):  # type: ignore[no-untyped-def]
     return out
 
 
-def shift(values: FloatArray, steps: float) -> FloatArray:
-    """Return a signal delayed by a number of steps, zero before."""
-    at = np.arange(len(values)) - steps
-    return np.asarray(np.interp(at, np.arange(-1, len(values)), np.concatenate([[0.0], values]), left=0.0))
-
-
-def remember(
-    memory: str, values: FloatArray, step: float, shape: float, constant: float = 0.0
-) -> FloatArray:
+def remember(memory: str, values: FloatArray, step: float, shape: float, constant: float = 0.0) -> FloatArray:
     """Return the memory of a signal along the steps; for `heat` of its square. constant: damping ratio."""
     if memory == "ring":
         return np.asarray(rings(values, step, shape, constant))
     if memory == "delay":
-        return shift(values, shape / step)
+        steps = shape / step
+        at = np.arange(len(values)) - steps
+        return np.asarray(
+            np.interp(at, np.arange(-1, len(values)), np.concatenate([[0.0], values]), left=0.0)
+        )
     if memory == "play":
         return np.asarray(plays(values, shape))
     if memory == "dahl":

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from html import escape
 from pathlib import Path
 
 import numpy as np
@@ -77,8 +78,6 @@ class Checks:
         return "\n".join(line.plain for line in check_lines(self.result))
 
     def _repr_html_(self) -> str:
-        from html import escape
-
         return f"<pre>{escape(self.summary())}</pre>"
 
     def __repr__(self) -> str:

@@ -161,8 +161,7 @@ def in_steps(t: FloatArray, start: float, step: float) -> FloatArray:
     """Return stamps (s) in steps since `start`; those on the grid but for their rounding are put on it."""
     at = (t - start) / step
     nearest = np.rint(at)
-    result: FloatArray = np.where(np.abs(at - nearest) < ON_GRID, nearest, at)
-    return result
+    return np.asarray(np.where(np.abs(at - nearest) < ON_GRID, nearest, at))
 
 
 @njit(cache=True, nogil=True)

@@ -213,8 +213,7 @@ def smooth(values: FloatArray, period: float) -> FloatArray:
     """Return values behind the Butterworth filter, run both ways. period: s, between samples."""
     from scipy.signal import butter, filtfilt
 
-    result: FloatArray = filtfilt(*butter(4, min(CUT_OFF * 2.0 * period, 0.8)), values)
-    return result
+    return np.asarray(filtfilt(*butter(4, min(CUT_OFF * 2.0 * period, 0.8)), values))
 
 
 def inverse_torque(rig: Rig, motion: Motion) -> FloatArray:

@@ -17,16 +17,8 @@ Advanced PID Control, 2006, section 3.5).
 import math
 from dataclasses import replace
 
+from rsea_ros.effects import signal_table as st
 from rsea_ros.effects.effect import compiled
-from rsea_ros.effects.signal_table import (
-    COMMAND,
-    CURRENT,
-    OUTPUT_ANGLE,
-    OUTPUT_VELOCITY,
-    REFERENCE,
-    STEP,
-    TIME,
-)
 from rsea_ros.errors import ChannelError
 from rsea_ros.model.rig import PositionLoop, Rig
 from rsea_ros.records.record import Channel, ComplexArray, Record
@@ -108,13 +100,13 @@ _SUM, _HELD, _DUE, _TARGET, _ASKED, _STARTED, _TOTAL, _COUNT = range(STATES)
 @compiled
 def control(s, p, x):  # type: ignore[no-untyped-def]
     """Add the loop's torque. p: kind, three gains, feed-forward, limits of torque and speed, sample time."""
-    h, r = s[STEP], s[REFERENCE]
+    h, r = s[st.STEP], s[st.REFERENCE]
     x[_TOTAL] += r
     x[_COUNT] += 1.0
     if x[_STARTED] == 0.0:
         x[_TARGET] = x[_ASKED] = r
-        x[_DUE], x[_STARTED] = s[TIME], 1.0
-    if s[TIME] + 0.5 * h > x[_DUE]:
+        x[_DUE], x[_STARTED] = s[st.TIME], 1.0
+    if s[st.TIME] + 0.5 * h > x[_DUE]:
         dt = max(p[_SAMPLE], h)
         x[_DUE] += dt
         r = x[_TOTAL] / x[_COUNT]
@@ -124,15 +116,15 @@ def control(s, p, x):  # type: ignore[no-untyped-def]
         if p[_KIND] == PD:
             most = p[_VELOCITY_LIMIT] * dt
             x[_TARGET] += min(max(r - x[_TARGET], -most), most)
-            error = x[_TARGET] - s[OUTPUT_ANGLE]
-            u = p[_POSITION] * error - p[_VELOCITY] * s[OUTPUT_VELOCITY] + forward
+            error = x[_TARGET] - s[st.OUTPUT_ANGLE]
+            u = p[_POSITION] * error - p[_VELOCITY] * s[st.OUTPUT_VELOCITY] + forward
         else:
-            speed = p[_POSITION] * (r - s[OUTPUT_ANGLE])
-            error = min(max(speed, -p[_VELOCITY_LIMIT]), p[_VELOCITY_LIMIT]) - s[OUTPUT_VELOCITY]
+            speed = p[_POSITION] * (r - s[st.OUTPUT_ANGLE])
+            error = min(max(speed, -p[_VELOCITY_LIMIT]), p[_VELOCITY_LIMIT]) - s[st.OUTPUT_VELOCITY]
             u = p[_VELOCITY] * error
         u += p[_INTEGRAL] * x[_SUM]
         x[_HELD] = min(max(u, -p[_TORQUE_LIMIT]), p[_TORQUE_LIMIT])
         if u == x[_HELD] or math.copysign(1.0, error) != math.copysign(1.0, u):
             x[_SUM] += error * dt
-    s[COMMAND] += x[_HELD]
-    s[CURRENT] += x[_HELD]
+    s[st.COMMAND] += x[_HELD]
+    s[st.CURRENT] += x[_HELD]

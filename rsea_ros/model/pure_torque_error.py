@@ -52,14 +52,14 @@ def mean_squares(state, ring, window, t, error, torque):  # type: ignore[no-unty
     """
     if not (np.isfinite(error) and np.isfinite(torque)):
         error, torque = 0.0, 0.0
-    row, within = int(state[NEWEST]) % LENGTH, window * (1.0 - ROUNDING)
+    row, within = int(state[NEWEST]) % len(ring), window * (1.0 - ROUNDING)
     ring[row, 0], ring[row, 1], ring[row, 2] = t, error * error, torque * torque
     state[NEWEST] += 1.0
     state[SUM_ERROR] += error * error
     state[SUM_TORQUE] += torque * torque
     while state[OLDEST] < state[NEWEST] - 1.0:
-        old = int(state[OLDEST]) % LENGTH
-        if t - ring[old, 0] < within and state[NEWEST] - state[OLDEST] < LENGTH:
+        old = int(state[OLDEST]) % len(ring)
+        if t - ring[old, 0] < within and state[NEWEST] - state[OLDEST] < len(ring):
             break
         state[SUM_ERROR] -= ring[old, 1]
         state[SUM_TORQUE] -= ring[old, 2]
@@ -74,8 +74,8 @@ def mean_squares(state, ring, window, t, error, torque):  # type: ignore[no-unty
 def _anew(state, ring):  # type: ignore[no-untyped-def]
     state[SUM_ERROR] = state[SUM_TORQUE] = 0.0
     for k in range(int(state[OLDEST]), int(state[NEWEST])):
-        state[SUM_ERROR] += ring[k % LENGTH, 1]
-        state[SUM_TORQUE] += ring[k % LENGTH, 2]
+        state[SUM_ERROR] += ring[k % len(ring), 1]
+        state[SUM_TORQUE] += ring[k % len(ring), 2]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -179,8 +179,7 @@ class ErrorFlag:
             distal = proximal = math.nan
         if math.isnan(t):
             return int(self._state[VERDICT])
-        verdict: int = judge_error(self._state, self._ring, t, distal, proximal, sigma, heard)
-        return verdict
+        return int(judge_error(self._state, self._ring, t, distal, proximal, sigma, heard))
 
     @property
     def verdict(self) -> str:

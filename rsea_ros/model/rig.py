@@ -409,8 +409,19 @@ def check_structure(rig: Rig) -> None:
     """Raise RigError where parts of a rig contradict each other, or one is missing."""
     for end in set(rig.clamped) - set(END_NAMES):
         raise RigError(f"rig {rig.name}: clamped end {end!r}, expected one of {', '.join(END_NAMES)}")
-    _check_trains(rig)
-    _check_ends(rig)
+    for key, value, allowed in (
+        ("gear.train", rig.train, TRAINS), *(("gear.or", train, TRAINS) for train in rig.other_trains),
+        ("proximal", rig.proximal, END_NAMES), ("ft_end", rig.ft_end, END_NAMES),
+        ("encoder_end", rig.encoder_end, ("gear_output", "spring_end")),
+        ("motion", rig.motion, ("simulated", "measured")), ("beside_spring", rig.beside_spring, PARTS),
+    ):  # fmt: skip
+        if value not in allowed:
+            raise RigError(f"rig {rig.name}: {key} = {value!r}, expected one of {', '.join(allowed)}", key)
+    if rig.ft_end == "housing_end" and math.isinf(rig["proximal_spring.stiffness"]):
+        raise RigError(
+            f"rig {rig.name}: ft_end = housing_end without proximal_spring.stiffness, expected that of the "
+            "sensor, N·m/rad"
+        )
     _check_spring(rig)
     for name in ("rotor.reflected_inertia", "rotor.reflected_damping"):
         rig[name]
@@ -431,28 +442,6 @@ def check_unfiltered(rig: Rig, channels: Collection[str], what: str) -> None:
     """Raise RigError where a channel has a known filter that something (what) cannot serve."""
     for at in (f"sensors.{n}.filter" for n in rig.filters() if n in channels):
         raise RigError(f"rig {rig.name}: {at}, expected none for {what}", at)
-
-
-def _check_trains(rig: Rig) -> None:
-    expected = f"expected one of {', '.join(TRAINS)}"
-    if rig.train not in TRAINS:
-        raise RigError(f"rig {rig.name}: gear.train = {rig.train!r}, {expected}", "gear.train")
-    for train in rig.other_trains:
-        if train not in TRAINS:
-            raise RigError(f"rig {rig.name}: gear.or has {train!r}, {expected}", "gear.or")
-
-
-def _check_ends(rig: Rig) -> None:
-    possible = {"proximal": END_NAMES, "ft_end": END_NAMES, "encoder_end": ("gear_output", "spring_end"),
-                "motion": ("simulated", "measured"), "beside_spring": PARTS}  # fmt: skip
-    for key, ends in possible.items():
-        if (end := getattr(rig, key)) not in ends:
-            raise RigError(f"rig {rig.name}: {key} = {end!r}, expected one of {', '.join(ends)}", key)
-    if rig.ft_end == "housing_end" and math.isinf(rig["proximal_spring.stiffness"]):
-        raise RigError(
-            f"rig {rig.name}: ft_end = housing_end without proximal_spring.stiffness, expected that of the "
-            "sensor, N·m/rad"
-        )
 
 
 def _check_spring(rig: Rig) -> None:

@@ -12,7 +12,7 @@ from typing import Any
 
 from rsea_ros.documents import strict_yaml
 from rsea_ros.documents.wording import did_you_mean, quote
-from rsea_ros.errors import OutputError, RigError
+from rsea_ros.errors import OutputError, RigError, RseaError
 from rsea_ros.model.rig import CLOCK_DOUBT, FIELDS, Condition, Quantity, Rig, Sensor
 from rsea_ros.model.rig_document import rig_from_document, with_conditions
 from rsea_ros.model.sensor_filter import KINDS
@@ -110,19 +110,22 @@ def rig_path(name_or_path: str | Path) -> Path:
     path = Path(name_or_path)
     if path.suffix in (".yaml", ".yml") or path.is_file():
         return path
+    return packaged("rig", str(name_or_path), "rigs", RigError)
+
+
+def packaged(what: str, name: str, kind: str, error: type[RseaError]) -> Path:
+    """Return the file NAME.yaml in config/KIND. Raises the error for a name that none has."""
     for folder in rig_folders():
-        if (folder / f"{name_or_path}.yaml").exists():
-            return folder / f"{name_or_path}.yaml"
-    known = rig_names()
-    near = did_you_mean(str(name_or_path), known)
-    raise RigError(
-        f"rig {str(name_or_path)!r} not found, expected a YAML file or one of {', '.join(known)}{near}"
-    )
+        if (file := folder.parent / kind / f"{name}.yaml").exists():
+            return file
+    known = packaged_names(kind)
+    expected = f"a YAML file or one of {', '.join(known)}{did_you_mean(name, known)}"
+    raise error(f"{what} {name!r} not found, expected {expected}")
 
 
-def rig_names() -> list[str]:
-    """Return the names of the rigs that come with the package."""
-    return sorted({p.stem for folder in rig_folders() for p in folder.glob("*.yaml")})
+def packaged_names(kind: str = "rigs") -> list[str]:
+    """Return the names of the files in config/KIND that come with the package."""
+    return sorted({p.stem for folder in rig_folders() for p in (folder.parent / kind).glob("*.yaml")})
 
 
 def rig_folders() -> list[Path]:
@@ -173,7 +176,7 @@ def save_rig(rig: Rig, path: str | Path, *, force: bool = False) -> None:
 
     Raises RigError, and leaves nothing behind, when it cannot be written.
     """
-    from rsea_ros.outputs.new_files import write_file  # a rig that is only read needs no writer
+    from rsea_ros.outputs.files import write_file  # a rig that is only read needs no writer
 
     try:
         write_file(path, rig_text(rig), force=force)

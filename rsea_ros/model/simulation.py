@@ -314,8 +314,7 @@ def _kick(machine: Machine, channel: str) -> float:
 
 def _middles(ends: FloatArray) -> FloatArray:
     """Return the values at the middle of each step from those at their ends."""
-    middles: FloatArray = 0.5 * (ends + np.concatenate([ends[:1], ends[:-1]]))
-    return middles
+    return np.asarray(0.5 * (ends + np.concatenate([ends[:1], ends[:-1]])))
 
 
 def run(machine: Machine, command: FloatArray, out: FloatArray, *, start: float = 0.0,
@@ -433,14 +432,6 @@ def synthesize(rig: Rig, command: Channel, *, seed: int = 0, noise: bool = True)
     )
     rng = sensor_noise(seed)
     true = simulate(rig, blank_record)
-    _check_bounded(rig, true)
-    chain = Filters(rig, period, period)
-    measured = {n: Channel(stamps, measure(rig, n, true[n], rng, chain) if noise else true[n]) for n in names}
-    return blank_record.with_channels(**measured)
-
-
-def _check_bounded(rig: Rig, true: Mapping[str, FloatArray]) -> None:
-    """Raise RigError for a simulation that runs away: no sensor could measure it, no file should hold it."""
     for name, y in true.items():
         bad = ~(np.abs(y) <= LARGEST)
         if bad.any():
@@ -449,6 +440,9 @@ def _check_bounded(rig: Rig, true: Mapping[str, FloatArray]) -> None:
                 f"rig {rig.name}: its simulation runs away, {name} is {y[k]:g} at sample {k}, "
                 f"expected at most {LARGEST:g}: check the rig's values and effects"
             )
+    chain = Filters(rig, period, period)
+    measured = {n: Channel(stamps, measure(rig, n, true[n], rng, chain) if noise else true[n]) for n in names}
+    return blank_record.with_channels(**measured)
 
 
 def sensor_noise(seed: int) -> np.random.Generator:

@@ -20,6 +20,7 @@ from scipy.special import chdtri  # chi2.isf, without the 0.3 s of scipy.stats
 from rsea_ros.compiler import njit
 from rsea_ros.model.equations import with_structure
 from rsea_ros.model.observer import ErrorModel, TorqueEstimate
+from rsea_ros.model.pure_torque_error import AGAIN, SUMS, mean_squares
 from rsea_ros.model.rig import Rig, check_two_torques
 from rsea_ros.model.transfer import end_to_end, flat_band
 from rsea_ros.records.record import HUGE, FloatArray, is_measured
@@ -34,14 +35,12 @@ WINDOW = 0.02
 SURPRISE, FAINT = (float(chdtri(1, p)) for p in (1e-8, 0.01))
 """Times the noise's power that are a torque: one that begins, with a false alarm of 1e-8 a window (with 50 a
 second once in 500 hours), and one that goes on, so that it is not lost at every crossing of zero."""
-AGAIN = 1.0
-"""s by which a stamp may be before the last one and of the same run."""
 DEAF = (math.inf, math.inf, 1.0)
 """NOISE_HIGH, NOISE_LOW, SIGMA with which nothing is heard: until it is calibrated."""
 
-FIRST, SECOND, SAMPLED, ROW, COUNT, IS_THERE, HEARD, LAST, HIGH, LOW, MEMORY = range(11)
-"""In `memory`: integrators; time of the last sample in the filter, next row and rows in use of its squares;
-whether there is a torque, when it was heard last, time of the last estimate (s), powers (N^2 m^2)."""
+FIRST, SECOND, SAMPLED, IS_THERE, HEARD, LAST, HIGH, LOW, MEMORY = range(SUMS, SUMS + 9)
+"""In `memory`, after the sums of the window: integrators; time of the last sample in the filter; if there
+is a torque, when it was heard last, time of the last estimate (s), powers (N^2 m^2)."""
 NOISE_HIGH, NOISE_LOW, SIGMA, QUIET = range(4)
 """In `limits`: N^2 m^2, the sigma of the torque with which that is so, N m, and after how long without a
 torque there is none, s."""
@@ -71,23 +70,14 @@ def powers(pair, corner, t, torque, window=WINDOW):  # type: ignore[no-untyped-d
     dt = t - memory[SAMPLED]
     memory[SAMPLED] = t
     if not 0.0 < dt * corner < SEEN:
-        memory[FIRST], memory[SECOND], memory[COUNT] = 0.0, torque, 0.0
+        memory[:SUMS], memory[FIRST], memory[SECOND] = 0.0, 0.0, torque
         return 0.0, torque * torque
     g = math.tan(math.pi * corner * dt)
     high = (torque - (DAMPING + g) * memory[FIRST] - memory[SECOND]) / (1.0 + g * (DAMPING + g))
     band = g * high + memory[FIRST]
     low = g * band + memory[SECOND]
     memory[FIRST], memory[SECOND] = g * high + band, g * band + low
-    row = int(memory[ROW])
-    squares[row, 0], squares[row, 1], squares[row, 2] = t, high * high, low * low
-    memory[ROW], memory[COUNT] = (row + 1) % LENGTH, min(memory[COUNT] + 1, LENGTH)
-    above = below = 0.0
-    count = 0
-    while count < memory[COUNT] and t - squares[(row - count) % LENGTH, 0] < window:
-        above += squares[(row - count) % LENGTH, 1]
-        below += squares[(row - count) % LENGTH, 2]
-        count += 1
-    return above / count, below / count
+    return mean_squares(memory, squares, window, t, high, low)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

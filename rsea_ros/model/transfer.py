@@ -8,29 +8,25 @@ exact one in magnitude and phase.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+import numpy.typing as npt
 from numpy.polynomial import polynomial
 
+from rsea_ros.errors import ParameterError
 from rsea_ros.model import outputs, propagator
 from rsea_ros.model.equations import PORTS, mechanics
 from rsea_ros.model.outputs import Output, Sees
-from rsea_ros.model.rig import Rig
+from rsea_ros.model.rig import END_NAMES, Rig
+from rsea_ros.model.train import spin_inertia
 from rsea_ros.records.record import ComplexArray, FloatArray
 
 if TYPE_CHECKING:
     from control import TransferFunction
-import math
-from dataclasses import replace
-
-import numpy.typing as npt
-
-from rsea_ros.errors import ParameterError
-from rsea_ros.model.rig import END_NAMES
-from rsea_ros.model.train import spin_inertia
 
 _ROUNDING = 1e-12
 """A sum that is smaller than this part of its terms is zero."""
@@ -269,5 +265,4 @@ def _inner(a: _Complex, b: _Complex) -> FloatArray:
 def _positive_roots(p: npt.NDArray[np.floating]) -> FloatArray:
     """Return the real roots above zero, rad/s."""
     roots = polynomial.polyroots(polynomial.polytrim(p))
-    real: FloatArray = roots[(np.abs(roots.imag) <= 1e-9 * np.abs(roots)) & (roots.real > 0.0)].real
-    return real
+    return np.asarray(roots[(np.abs(roots.imag) <= 1e-9 * np.abs(roots)) & (roots.real > 0.0)].real)

@@ -8,16 +8,8 @@ from typing import Any
 from rclpy.node import Node
 from rclpy.serialization import serialize_message
 
-from msg_adapters.cdr import VALUES
-from msg_adapters.raw import RawWriter
-from msg_adapters.ros import (
-    JointState,
-    WrenchStamped,
-    deflection_message,
-    joint_state_message,
-    joint_states_message,
-    wrench_message,
-)
+from msg_adapters import ros
+from msg_adapters.cdr import VALUES, RawWriter
 from msg_adapters.topic_map import FLOATS, JOINT_STATE, TYPES
 from rsea_ros.hardware.device import State
 from rsea_ros.nodes._anchor import Anchor
@@ -91,25 +83,25 @@ class BenchTopics:
         self.commands, self._obeyed = CommandQueue(strict=strict, limit=limit), Obeyed()
         self._reported: Mapping[str, int] = {}
         self._polled = 0
-        self._states = _publisher(node, JointState, f"{within}joint_states")
-        self._ft = _publisher(node, WrenchStamped, f"{within}ft")
+        self._states = _publisher(node, ros.JointState, f"{within}joint_states")
+        self._ft = _publisher(node, ros.WrenchStamped, f"{within}ft")
         joint, frame, ft_frame = (names[p.name] for p in NAMES)
         self._state_writer = RawWriter(
-            serialize_message(joint_state_message(0, 0.0, 0.0, 0.0, joint, frame)), TYPES["joint_states"],
+            serialize_message(ros.joint_state_message(0, 0.0, 0.0, 0.0, joint, frame)), TYPES["joint_states"],
             "position", "velocity", "effort",
         )  # fmt: skip
         frames = {False: ft_frame, True: names.get(SPRING_FRAME.name, ft_frame)}
         self._ft_writers = {
             inferred: RawWriter(
-                serialize_message(wrench_message(0, (0.0,) * 6, frame=at)), TYPES["ft"], "wrench"
+                serialize_message(ros.wrench_message(0, (0.0,) * 6, frame=at)), TYPES["ft"], "wrench"
             )
             for inferred, at in frames.items()
         }
         self._deflection_writer = RawWriter(
-            serialize_message(deflection_message(0, 0.0, joint, frames[True])),
+            serialize_message(ros.deflection_message(0, 0.0, joint, frames[True])),
             TYPES["deflection"], "position",
         )  # fmt: skip
-        self._deflections = _publisher(node, JointState, f"{within}deflection") if deflects else None
+        self._deflections = _publisher(node, ros.JointState, f"{within}deflection") if deflects else None
         kind = names.get(COMMAND_TYPE.name, JOINT_STATE)
         self._wanted = Mailbox(
             node, f"{within}torque_command", MessageFields(kind, ((COMMANDS[kind], 0),), joint),
@@ -188,8 +180,8 @@ class Combined:
 
     def __init__(self, node: Node, names: Sequence[str]) -> None:
         self._node = node
-        self._publisher = _publisher(node, JointState, "joint_states")
-        template = serialize_message(joint_states_message(names))
+        self._publisher = _publisher(node, ros.JointState, "joint_states")
+        template = serialize_message(ros.joint_states_message(names))
         self._writer = RawWriter(template, TYPES["joint_states"], "position", "velocity", "effort")
 
     def publish(self, states: Sequence[State | None], shift: int) -> None:

@@ -1,5 +1,6 @@
 """A thread that works at absolute deadlines. Timers of rclpy lose ticks at 1 kHz and drift; this does not."""
 
+import math
 import threading
 import time
 from collections.abc import Callable
@@ -10,7 +11,7 @@ from statistics import fmean
 from rsea_ros.nodes._anchor import SECOND, Anchor
 from rsea_ros.nodes._realtime import Worker
 
-__all__ = ["SECOND", "Cycle", "Timing", "wait_until"]
+__all__ = ["SECOND", "Cycle", "Timing", "on_grid", "wait_until"]
 
 LONGEST_CATCH_UP = SECOND
 
@@ -92,6 +93,11 @@ class Cycle(Worker):
             skipped = late if late > allowed else 0
             self.left_out += skipped
             k += 1 + skipped
+
+
+def on_grid(earliest: int, measured: int, rate: float) -> int:
+    """Return the first instant not before another that is whole periods after a measurement, ns. rate: Hz."""
+    return measured + round(math.ceil((earliest - measured) * rate / SECOND) * SECOND / rate)
 
 
 def wait_until(due: int) -> None:

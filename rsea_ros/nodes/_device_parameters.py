@@ -1,7 +1,5 @@
 """Parameters of devices, and the buses that joints share."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 

@@ -1,7 +1,5 @@
 """Devices of the driver: parameters to a device and its limits."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from typing import Any

@@ -50,7 +50,11 @@ class DriverCycle:
         commands, now = self._source.commands, self.anchor.now()
         commands.take(max(stamp, now - self._period) + self._period // 2)
         if self.zero_first and commands.first is not None and not self._deaf:
-            self._check_zero(commands.first)
+            self.zero_first = False
+            if commands.first != 0.0:
+                torque = f"the first command since autostart is {commands.first:.4g} N·m"
+                detail = f"{torque}, expected 0 N·m or resume:=true"
+                self.guarded.guard.trip(DeviceFault(RESTARTED, detail=detail))
         return commands.torque, None if self._deaf else commands.age(now)
 
     @contextmanager
@@ -70,13 +74,6 @@ class DriverCycle:
         """End the torque with the next cycle, until a later clear; commands so far are forgotten."""
         with self.deaf():
             self.guarded.stop(is_answered=is_answered)
-
-    def _check_zero(self, torque: float) -> None:
-        """Latch a fault where the first command since autostart is a torque."""
-        self.zero_first = False
-        if torque != 0.0:
-            detail = f"the first command since autostart is {torque:.4g} N·m, expected 0 N·m or resume:=true"
-            self.guarded.guard.trip(DeviceFault(RESTARTED, detail=detail))
 
     def _see_to_the_clock(self, by: int) -> None:
         """Drop the commands from before the system clock was set: nobody knows which are of now.

@@ -1,7 +1,5 @@
 """The joints of a driver, and jobs that wait for a cycle."""
 
-from __future__ import annotations
-
 import re
 import threading
 from collections.abc import Callable, Mapping, Sequence

@@ -9,7 +9,7 @@ from rclpy.callback_groups import CallbackGroup
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
-from msg_adapters.raw import RawReader
+from msg_adapters.cdr import RawReader
 from msg_adapters.ros import message_type
 from rsea_ros.errors import ParameterError
 from rsea_ros.nodes._qos import OVERRIDES
@@ -21,13 +21,6 @@ class Polled(CallbackGroup):
     def can_execute(self, entity: object) -> bool:
         """Return False: never by an executor."""
         return False
-
-    def beginning_execution(self, entity: object) -> bool:
-        """Return False: never by an executor."""
-        return False
-
-    def ending_execution(self, entity: object) -> None:
-        """Do nothing."""
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,6 @@ A live run is played and recorded, and valid only without a failure.
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable
 
@@ -13,16 +12,10 @@ import numpy as np
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 
-from msg_adapters.ros import (
-    ERROR,
-    DiagnosticArray,
-    JointState,
-    stamp_of,
-    torque_command_message,
-)
+from msg_adapters import ros
 from rsea_ros.errors import DeviceError, RseaError
 from rsea_ros.experiment.joint_weighing import SHORTEST
-from rsea_ros.nodes._cycle import SECOND, Cycle
+from rsea_ros.nodes._cycle import SECOND, Cycle, on_grid
 from rsea_ros.nodes._qos import COMMAND, DISCOVERY_TIME, MEASUREMENT, await_arrival
 from rsea_ros.nodes._tap import Ears
 from rsea_ros.records.record import FloatArray, Record
@@ -52,15 +45,16 @@ class Player:
         wanted: int,
         joint: str,
         ready: Callable[[], bool] = lambda: True,
-        publisher: Publisher[JointState] | None = None,
+        publisher: Publisher[ros.JointState] | None = None,
     ) -> None:
         self.command, self.rate = command, rate
         self.next, self.left_out, self.started = 0, 0, False
         self._node, self._lead, self._wanted, self._joint = node, round(lead * SECOND), wanted, joint
         self._stamp, self._last, self._ready = 0, 0.0, ready
         self._stopped_at = -1
-        self._publisher = publisher or node.create_publisher(JointState, "torque_command", COMMAND)
-        self._measurements = node.create_subscription(JointState, "joint_states", self._begin, MEASUREMENT)
+        self._publisher = publisher or node.create_publisher(ros.JointState, "torque_command", COMMAND)
+        states = ros.JointState, "joint_states", self._begin, MEASUREMENT
+        self._measurements = node.create_subscription(*states)
         self.cycle = Cycle(rate, self._step, catch_up=True)
 
     @property
@@ -89,35 +83,26 @@ class Player:
         """Go softly to zero, command zero torque after the last command, and wait until that has arrived."""
         if not self.started:
             self._node.destroy_subscription(self._measurements)
-        self._end_softly()
-        self.cycle.stop()
-        last = max(self._stamp, time.time_ns())
-        for k in range(1, CLOSING_ZEROS + 1 if self.started else 1):
-            stamp = last + round(k * SECOND / self.rate)
-            self._publisher.publish(torque_command_message(stamp, 0.0, self._joint))
-        await_arrival(self._publisher)
-
-    def _end_softly(self) -> None:
-        """Wait for the soft end of a run that is under way, unless its thread has failed."""
         deadline = time.monotonic() + 2.0 * SOFT
         if self.started and self.next < len(self.command):
             self.stop()
         while self.started and self.cycle.error is None and time.monotonic() < deadline and not self.over():
             time.sleep(0.005)
+        self.cycle.stop()
+        last = max(self._stamp, time.time_ns())
+        for k in range(1, CLOSING_ZEROS + 1 if self.started else 1):
+            stamp = last + round(k * SECOND / self.rate)
+            self._publisher.publish(ros.torque_command_message(stamp, 0.0, self._joint))
+        await_arrival(self._publisher)
 
-    def _begin(self, message: JointState) -> None:
+    def _begin(self, message: ros.JointState) -> None:
         """Start at a whole number of periods after a measurement, once all subscribers listen."""
         if self.started or self.stopped or self.subscriptions < self._wanted or not self._ready():
             return
         self.started = True
-        self.cycle.start(self._first(stamp_of(message.header.stamp)) - self._lead)
-        self._node.destroy_subscription(self._measurements)
-
-    def _first(self, measured: int) -> int:
-        """Return when the first command takes effect, ns."""
         earliest = time.time_ns() + self._lead + DISCOVERY_TIME
-        periods = math.ceil((earliest - measured) * self.rate / SECOND)
-        return measured + round(periods * SECOND / self.rate)
+        self.cycle.start(on_grid(earliest, ros.stamp_of(message.header.stamp), self.rate) - self._lead)
+        self._node.destroy_subscription(self._measurements)
 
     def _step(self, now: int) -> None:
         """Publish the next command, or leave it out when this thread was held up for too long."""
@@ -127,7 +112,7 @@ class Player:
         if self._lead and self._stamp - time.time_ns() < min(MARGIN, self._lead // 2):
             self.left_out += 1
         else:
-            self._publisher.publish(torque_command_message(self._stamp, torque, self._joint))
+            self._publisher.publish(ros.torque_command_message(self._stamp, torque, self._joint))
 
     def _torque(self, k: int) -> float:
         """Return the command of cycle k: as planned; after a stop the last one, decreasing to zero."""
@@ -156,7 +141,7 @@ class BenchEars:
         self.last = time.monotonic()
         self._failed: set[str] = set()
         self._ears = Ears(node, axis, {"torque_command"}, self._heard)
-        self._health = node.create_subscription(DiagnosticArray, "/diagnostics", self._on_health, COMMAND)
+        self._health = node.create_subscription(ros.DiagnosticArray, "/diagnostics", self._on_health, COMMAND)
 
     def begin(self, alarm: Callable[[str], None]) -> None:
         """Start a new record. alarm: called when a node of the bench has failed."""
@@ -175,10 +160,10 @@ class BenchEars:
         if role != "torque_command":
             self.last = time.monotonic()
 
-    def _on_health(self, message: DiagnosticArray) -> None:
+    def _on_health(self, message: ros.DiagnosticArray) -> None:
         """Raise the alarm for failures after the beginning of the run only."""
         for status in message.status:
-            if status.level != ERROR:
+            if status.level != ros.ERROR:
                 self._failed.discard(status.name)
             elif status.name not in self._failed:
                 self._failed.add(status.name)

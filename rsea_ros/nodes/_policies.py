@@ -82,17 +82,13 @@ def _joints(joints: Sequence[str]) -> Profiles:
     for name in OF_A_JOINT:
         each = interfaces(name)
         for joint in joints:
-            profiles[f"{NAMESPACE}/{joint}", name] = _within(each, f"/{NAMESPACE}/{joint}/")
+            namespace = f"/{NAMESPACE}/{joint}/"
+            usual = f"/{NAMESPACE}/"
+            profiles[f"{NAMESPACE}/{joint}", name] = {
+                kind: {namespace + n.removeprefix(usual) if n.startswith(usual) else n for n in names}
+                for kind, names in each.items()
+            }
     return profiles
-
-
-def _within(interfaces: Interfaces, namespace: str) -> Interfaces:
-    """Return what a node has in another namespace: its names are relative, but for those of all nodes."""
-    usual = f"/{NAMESPACE}/"
-    return {
-        kind: {namespace + n.removeprefix(usual) if n.startswith(usual) else n for n in names}
-        for kind, names in interfaces.items()
-    }
 
 
 def interfaces(name: str, **parameters: object) -> Interfaces:

@@ -1,7 +1,5 @@
 """Threads that keep time: exact timers, a processor of their own, and real-time priority where permitted."""
 
-from __future__ import annotations
-
 import ctypes
 import gc
 import os
@@ -77,16 +75,7 @@ def keep_time(node: Node, worker: Worker, values: Mapping[str, Any]) -> None:
     gc.collect()  # a garbage collection over everything that a node has loaded
     gc.freeze()
     worker.start()
-    _settle(node, values["cpu_affinity"])
-    if priority := values["realtime_priority"]:
-        try:
-            raise_priority(worker.thread, priority)
-        except ParameterError as error:
-            node.get_logger().warning(f"{error}; runs without")
-
-
-def _settle(node: Node, processor: int) -> None:
-    """Keep all threads on one processor (below zero: any); warn where this process has no right to it."""
+    processor = values["cpu_affinity"]
     if processor in PROCESSORS:
         _bind({processor})
     elif processor >= 0:
@@ -94,6 +83,11 @@ def _settle(node: Node, processor: int) -> None:
         node.get_logger().warning(
             f"parameter cpu_affinity = {processor}, expected one of {allowed}; runs on any"
         )
+    if priority := values["realtime_priority"]:
+        try:
+            raise_priority(worker.thread, priority)
+        except ParameterError as error:
+            node.get_logger().warning(f"{error}; runs without")
 
 
 def raise_priority(first: threading.Thread, priority: int) -> None:

@@ -100,7 +100,7 @@ def run_node(
             get_logger(name).warning(f"RSEA_EFFECTS={printable(effects)}: code from there runs in this node")
         node = _make(kind, name)
         done = _work(node, make(node, declare(node, table, more)), stop)
-        return SUCCESS if done or (endless and stop.is_regular) else stop.status
+        return SUCCESS if done or (endless and stop.status - Stopped.BASE in STOPPING) else stop.status
     except Stopped as stopped:
         return stopped.status
     except (RseaError, OSError) as error:
@@ -127,11 +127,6 @@ class _Stop:
     def asked(self) -> bool:
         """Whether a signal has arrived."""
         return self.status > 0
-
-    @property
-    def is_regular(self) -> bool:
-        """Whether it was one that asks a process to stop."""
-        return self.status - Stopped.BASE in STOPPING
 
     def _ask(self, number: int, frame: FrameType | None) -> None:
         self.status = Stopped(number).status

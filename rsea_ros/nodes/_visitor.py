@@ -12,14 +12,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 
-from msg_adapters.ros import (
-    ChangeState,
-    GetAvailableTransitions,
-    GetState,
-    Trigger,
-    message_text,
-    message_type,
-)
+from msg_adapters import ros
 from rsea_ros.documents.wording import did_you_mean
 from rsea_ros.errors import ParameterError, RseaError
 from rsea_ros.nodes._run import LOCAL, NAMESPACE
@@ -105,7 +98,7 @@ class Listener:
             spin(self._node, seconds, lambda: bool(waiting))
             if not waiting:
                 raise ParameterError(f"{name}: {number} messages within {seconds:g} s, expected {count}")
-            yield message_text(waiting.pop(0))
+            yield ros.message_text(waiting.pop(0))
 
     def _subscribe(self, topic: str, hear: Any, *, raw: bool) -> str:
         """Subscribe to a topic with the durability of its publisher; return its full name."""
@@ -118,7 +111,7 @@ class Listener:
             reliability=ReliabilityPolicy.RELIABLE if is_latched else ReliabilityPolicy.BEST_EFFORT,
             durability=DurabilityPolicy.TRANSIENT_LOCAL if is_latched else DurabilityPolicy.VOLATILE,
         )
-        self._node.create_subscription(message_type(kind), name, hear, qos, raw=raw)
+        self._node.create_subscription(ros.message_type(kind), name, hear, qos, raw=raw)
         return name
 
     def _type_of(self, name: str) -> str:
@@ -174,7 +167,7 @@ class Caller:
         """Return the state of a node with a lifecycle; empty for others."""
         if not self._has_lifecycle(name):
             return ""
-        return str(self._question(GetState, f"{name}/get_state").current_state.label)
+        return str(self._question(ros.GetState, f"{name}/get_state").current_state.label)
 
     def call(self, name: str, action: str) -> str:
         """Do one action of a node and return its answer.
@@ -197,14 +190,14 @@ class Caller:
         raise ParameterError(f"{name}: {action!r}{state}, expected one of: {', '.join(offered)}{near}")
 
     def _change(self, name: str, transition: str, number: int) -> str:
-        request = ChangeState.Request()
+        request = ros.ChangeState.Request()
         request.transition.id = number
-        if not self._ask(ChangeState, f"{name}/change_state", request).success:
+        if not self._ask(ros.ChangeState, f"{name}/change_state", request).success:
             raise CallRefused(f"{name}: {transition} failed, it is {self.state(name)}: its log says why")
         return f"{name}: {self.state(name)}"
 
     def _trigger(self, name: str, service: str) -> str:
-        answer = self._ask(Trigger, f"{name}/{service}", Trigger.Request())
+        answer = self._ask(ros.Trigger, f"{name}/{service}", ros.Trigger.Request())
         if not answer.success:
             raise CallRefused(f"{name}: {service} was refused: {answer.message}")
         return f"{name}: {answer.message or service}"
@@ -245,7 +238,7 @@ class Caller:
         """Return the transitions that a node's state allows: number by name."""
         if not self._has_lifecycle(name):
             return {}
-        answer = self._question(GetAvailableTransitions, f"{name}/get_available_transitions")
+        answer = self._question(ros.GetAvailableTransitions, f"{name}/get_available_transitions")
         return {each.transition.label: each.transition.id for each in answer.available_transitions}
 
     def _question(self, kind: Any, name: str) -> Any:

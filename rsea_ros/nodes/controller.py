@@ -13,7 +13,7 @@ from typing import Any
 from rclpy.node import Node
 from rclpy.serialization import serialize_message
 
-from msg_adapters.raw import RawWriter
+from msg_adapters.cdr import RawWriter
 from msg_adapters.ros import JointState, Trigger, torque_command_message
 from msg_adapters.topic_map import TYPES
 from rsea_ros.control.controller import Measurement

@@ -4,8 +4,6 @@ It begins with earlier recordings (`bag`). ~/approve plays the proposed run,
 ~/decline ends the session, ~/cancel stops a run softly at any sample. The results are on /diagnostics.
 """
 
-from __future__ import annotations
-
 import sys
 import threading
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -29,8 +27,7 @@ from rsea_ros.nodes._parameters import AXIS, JOINT, NodeParameter
 from rsea_ros.nodes._player import BenchEars, LiveRun, Player
 from rsea_ros.nodes._qos import COMMAND
 from rsea_ros.nodes._run import run_node
-from rsea_ros.outputs.files import unused_path
-from rsea_ros.outputs.new_files import Destination
+from rsea_ros.outputs.files import Destination, unused_path
 from rsea_ros.records.record import Record
 from rsea_ros.report.diagnosis.page import write_diagnosis
 from rsea_ros.report.diagnosis.words import diagnosis_sentence

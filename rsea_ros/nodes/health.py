@@ -1,7 +1,5 @@
 """health: watches a joint at work, reports changes, keeps the last minutes as a bag. It only listens."""
 
-from __future__ import annotations
-
 import math
 import os
 import shlex
@@ -26,7 +24,7 @@ from rsea_ros.model.rig_file import load_rig
 from rsea_ros.nodes._commands import WATCHDOG
 from rsea_ros.nodes._cycle import SECOND
 from rsea_ros.nodes._health import OK, STEADY, WARN, Health, NodeHealth
-from rsea_ros.nodes._health_inputs import Events, HealthInputs, noise_from
+from rsea_ros.nodes._joint_inputs import Events, HealthInputs, noise_from
 from rsea_ros.nodes._parameters import AXIS, JOINT, NodeParameter
 from rsea_ros.nodes._qos import COMMAND
 from rsea_ros.nodes._run import NAMESPACE, Program, run_node

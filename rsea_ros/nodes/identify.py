@@ -18,7 +18,7 @@ from rclpy.node import Node
 from msg_adapters.records import write_overlay
 from msg_adapters.ros import Trigger
 from msg_adapters.topic_map import ROLES
-from rsea_ros.checks.carried import check_diagnosable
+from rsea_ros.checks.carried import check_diagnosable, with_check_faults
 from rsea_ros.diagnosis.result import Diagnosis
 from rsea_ros.documents.units import with_unit
 from rsea_ros.errors import RseaError
@@ -29,11 +29,10 @@ from rsea_ros.nodes._health import OK, WARN, Health, NodeHealth
 from rsea_ros.nodes._parameters import AXIS, NodeParameter
 from rsea_ros.nodes._run import run_node
 from rsea_ros.nodes._tap import Ears
-from rsea_ros.outputs.files import unused_path
-from rsea_ros.outputs.new_files import Destination, check_free
+from rsea_ros.outputs.files import Destination, check_free, unused_path
 from rsea_ros.records.record import Record
 from rsea_ros.report.diagnosis.words import diagnosis_sentence
-from rsea_ros.report.identification import verdict_sentence
+from rsea_ros.report.identification import verdict_sentence, write_results
 from rsea_ros.report.remark_words import fault_lines
 from rsea_ros.report.result_files import IDENTIFICATION, REPORT
 
@@ -83,7 +82,6 @@ class Diagnosing:
         self._pool.shutdown()
 
     def _diagnose(self, record: Record) -> Diagnosis:
-        from rsea_ros.checks.carried import with_check_faults
         from rsea_ros.diagnosis.diagnose import diagnose
         from rsea_ros.report.diagnosis.page import write_diagnosis
 
@@ -201,9 +199,7 @@ class IdentifyNode:
 
     def conclude(self) -> None:
         """Identify and write the results, or do nothing when stopped before."""
-        from rsea_ros.checks.carried import with_check_faults
         from rsea_ros.identification.identify import identify
-        from rsea_ros.report.identification import write_results
 
         if not self._done:
             return

@@ -16,12 +16,12 @@ from rclpy.node import Node
 from rclpy.parameter_client import AsyncParameterClient
 from rclpy.serialization import serialize_message
 
-from msg_adapters.raw import RawWriter
+from msg_adapters.cdr import RawWriter
 from msg_adapters.ros import Bool, DiagnosticArray, JointState, torque_command_message
 from msg_adapters.topic_map import JOINT_STATE, WRENCH, sign_and_index
 from rsea_ros.model.rig import END_NAMES, Rig
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.nodes._cycle import SECOND, Cycle
+from rsea_ros.nodes._cycle import SECOND, Cycle, on_grid
 from rsea_ros.nodes._health import OK, Health, NodeHealth
 from rsea_ros.nodes._mailbox import Mailbox, MessageFields
 from rsea_ros.nodes._parameters import AXIS, JOINT, NodeParameter
@@ -172,7 +172,8 @@ class WatchCommand:
                 self._cycle = None
         elif self.commander.active and self._source.newest:
             self._cycle = Cycle(self._rate, self._step, catch_up=False)
-            self._cycle.start(self._first() - LEAD)
+            earliest = time.time_ns() + 2 * LEAD
+            self._cycle.start(on_grid(earliest, self._source.newest, self._rate) - LEAD)
 
     def close(self) -> None:
         """End with zeros that have arrived, whichever page holds the command."""
@@ -191,12 +192,6 @@ class WatchCommand:
         torque = self.commander.torque((stamp - anchor.offset) / SECOND)
         if torque is not None and stamp + LEAD - anchor.now() > MARGIN:
             self._publisher.publish(self._writer.write(stamp + LEAD, [torque]))
-
-    def _first(self) -> int:
-        """Return when the first command takes effect, ns: a whole number of periods after a measurement."""
-        earliest = time.time_ns() + 2 * LEAD
-        periods = math.ceil((earliest - self._source.newest) * self._rate / SECOND)
-        return self._source.newest + round(periods * SECOND / self._rate)
 
     def _see_to_the_limits(self) -> None:
         """Request the limits from the publisher of joint_states until it has said them."""

@@ -16,19 +16,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rsea_ros.design.spring_design import band_range
+from rsea_ros.model import transfer
 from rsea_ros.model.equations import gear_inertia, train_ratio
 from rsea_ros.model.rig import END_NAMES, Rig
 from rsea_ros.model.train import PARTS, TRAINS, Part, Train
-from rsea_ros.model.transfer import (
-    end_response,
-    end_to_end,
-    flat_band,
-    inner_inertia,
-    pure_torque_bandwidth,
-    undamped_band,
-)
 from rsea_ros.paper import formulas
-from rsea_ros.paper.formulas import eq_6_distal_per_proximal
 from rsea_ros.records.record import ComplexArray, FloatArray
 
 TOLERANCES = ((3.0, 90.0), (1.0, 90.0), (3.0, 10.0), (1.0, 5.0))
@@ -56,18 +48,18 @@ def bands(rig: Rig, motor_torque: float) -> Bands:
     """Return the bands of a rig. motor_torque: N m."""
     k_s, j_sc, b_s = (rig[n] for n in ("spring.stiffness", "chassis.inertia", "spring.damping"))
     functions = {
-        "Eq. (6) undamped, element": eq_6_distal_per_proximal(k_s, j_sc, 0.0),
-        "Eq. (6) with b_s, element": eq_6_distal_per_proximal(k_s, j_sc, b_s),
-        "With the rotor's spin, element": end_to_end(rig, "element"),
-        "With the rotor's spin, sensor sees K_s + b_s s": end_to_end(rig),
+        "Eq. (6) undamped, element": formulas.eq_6_distal_per_proximal(k_s, j_sc, 0.0),
+        "Eq. (6) with b_s, element": formulas.eq_6_distal_per_proximal(k_s, j_sc, b_s),
+        "With the rotor's spin, element": transfer.end_to_end(rig, "element"),
+        "With the rotor's spin, sensor sees K_s + b_s s": transfer.end_to_end(rig),
     }
-    inner, spread = inner_inertia(rig), rig.spread("rotor.reflected_inertia")
-    edge = float(undamped_band(k_s, inner))
+    inner, spread = transfer.inner_inertia(rig), rig.spread("rotor.reflected_inertia")
+    edge = float(transfer.undamped_band(k_s, inner))
     return Bands(
-        eq_7=pure_torque_bandwidth(k_s, j_sc),
+        eq_7=transfer.pure_torque_bandwidth(k_s, j_sc),
         eq_7_spin=edge,
         spin_range=band_range(k_s, j_sc, inner - j_sc, spread),
-        rows={n: tuple(flat_band(f, *t) for t in TOLERANCES) for n, f in functions.items()},
+        rows={n: tuple(transfer.flat_band(f, *t) for t in TOLERANCES) for n, f in functions.items()},
         spring_limit=0.5 * k_s * math.sin(2.0 * math.radians(5.0)),
         motor_limit={f: motor_torque * _gain(rig, f) for f in (1.0, 5.0, 10.0, edge)},
     )
@@ -75,7 +67,7 @@ def bands(rig: Rig, motor_torque: float) -> Bands:
 
 def _gain(rig: Rig, hz: float) -> float:
     clamped = replace(rig, clamped=frozenset(END_NAMES))
-    return float(abs(end_response(clamped, np.array([hz]))[0]))
+    return float(abs(transfer.end_response(clamped, np.array([hz]))[0]))
 
 
 HZ: FloatArray = np.geomspace(0.5, 140.0, 60)
@@ -109,11 +101,12 @@ class Limit:
 def arrangements(rig: Rig) -> tuple[Arrangement, ...]:
     """Return the rig's inertias with each train, and with either part beside the spring."""
     turned = [replace(rig, train=t, beside_spring=p) for p in PARTS for t in TRAINS]
-    inertias = [(r["chassis.inertia"] + gear_inertia(r), inner_inertia(r)) for r in turned]
-    k_s = rig["spring.stiffness"]
+    inner = [transfer.inner_inertia(r) for r in turned]
+    edges = transfer.undamped_band(rig["spring.stiffness"], np.array(inner))
+    outer = [r["chassis.inertia"] + gear_inertia(r) for r in turned]
     return tuple(
-        Arrangement(r.beside_spring, r.train, train_ratio(r), *both, float(undamped_band(k_s, both[1])))
-        for r, both in zip(turned, inertias, strict=True)
+        Arrangement(r.beside_spring, r.train, train_ratio(r), *of_train, float(edge))
+        for r, of_train, edge in zip(turned, zip(outer, inner, strict=True), edges, strict=True)
     )
 
 
@@ -142,7 +135,7 @@ def _limit(what: str, of: str, values: Sequence[float], error: Callable[[float],
 
 
 def _off(rig: Rig, other: Rig) -> float:
-    return _worst(end_response(rig, HZ), end_response(other, HZ))
+    return _worst(transfer.end_response(rig, HZ), transfer.end_response(other, HZ))
 
 
 def _off_eq_5(rig: Rig) -> float:
@@ -151,11 +144,11 @@ def _off_eq_5(rig: Rig) -> float:
     eq_5 = formulas.eq_5_proximal_per_motor(
         rig["spring.stiffness"], *rotor, ratio, rig["chassis.inertia"], rig["spring.damping"]
     )
-    return _worst(end_response(rig, HZ, "housing_end"), eq_5(2j * np.pi * HZ))
+    return _worst(transfer.end_response(rig, HZ, "housing_end"), eq_5(2j * np.pi * HZ))
 
 
 def _end_to_end_off(rig: Rig) -> float:
-    both = end_response(rig, HZ) / end_response(rig, HZ, "housing_end")
+    both = transfer.end_response(rig, HZ) / transfer.end_response(rig, HZ, "housing_end")
     return _worst(both, np.ones(len(HZ), complex))
 
 

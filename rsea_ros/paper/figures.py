@@ -13,7 +13,6 @@ from rsea_ros.model import outputs, transfer
 from rsea_ros.model.equations import train_ratio
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.paper import formulas
-from rsea_ros.paper.claims import PROTOTYPE_TRAINS
 from rsea_ros.paper.rival_models import MovingOutput, largest_gap, lumped_rig, readings, resonance_hz
 from rsea_ros.records.record import FloatArray
 from rsea_ros.report import words
@@ -133,7 +132,7 @@ def figure_9() -> list[Figure]:
         rig = load_rig(rig_name)
         k_s, planetary = rig["spring.stiffness"], rig.train == "planetary"
         points.append(Point(name, k_s, rig["chassis.inertia"], colour, side="middle right"))
-        for train in (rig.train,) if planetary else PROTOTYPE_TRAINS:
+        for train in (rig.train,) if planetary else formulas.PROTOTYPE_TRAINS:
             turned = replace(rig, train=train)
             sign = "" if planetary else f", n = {words.signed_text(train_ratio(turned), 0)}"
             inner = transfer.inner_inertia(turned)
@@ -219,7 +218,7 @@ def end_to_end_curves(
     k_s, s = rig["spring.stiffness"], 2j * np.pi * hz
     eq_6 = formulas.eq_6_distal_per_proximal(k_s, rig["chassis.inertia"], rig["spring.damping"])
     curves, marks = [ResponseCurve(name, AFTER, hz, eq_6(s))], [first]
-    for train, (colour, dash), anchor in zip(PROTOTYPE_TRAINS, looks, sides, strict=True):
+    for train, (colour, dash), anchor in zip(formulas.PROTOTYPE_TRAINS, looks, sides, strict=True):
         turned = replace(rig, train=train)
         label = f"{spin}n = {words.signed_text(train_ratio(turned), 0)}"
         curves.append(ResponseCurve(label, colour, hz, transfer.end_to_end(turned)(s), dash=dash))

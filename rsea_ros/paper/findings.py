@@ -12,26 +12,20 @@ import numpy as np
 
 from rsea_ros.design.mechanism import spring_radius
 from rsea_ros.documents.units import STANDARD_GRAVITY
+from rsea_ros.model import transfer
 from rsea_ros.model.rig import END_NAMES, Quantity
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.model.transfer import (
-    end_response,
-    flat_band,
-    inner_inertia,
-    pure_torque_bandwidth,
-    resonance_peak,
-    undamped_band,
-)
-from rsea_ros.paper import claims, formulas
-from rsea_ros.paper.claims import PaperFinding
+from rsea_ros.paper import formulas
+from rsea_ros.paper.formulas import PaperFinding
 from rsea_ros.paper.rival_models import largest_gap, readings, resonance_hz
 
 
 def circuit() -> Iterator[PaperFinding]:
     platform = load_rig("paper_high_impedance")
-    k_s, j_sc = claims.table_2("K_s"), claims.table_2("J_sc")
+    k_s, j_sc = formulas.table_2("K_s"), formulas.table_2("J_sc")
     spin = platform["rotor.reflected_inertia"] / platform["gear.ratio"]
-    forward, backward = (float(undamped_band(k_s, j)) for j in (inner_inertia(platform), j_sc - spin))
+    inner = transfer.inner_inertia(platform), j_sc - spin
+    forward, backward = (float(transfer.undamped_band(k_s, j)) for j in inner)
     yield PaperFinding(
         "found", "Nomenclature and 2.2",
         "J_eff is the “sum of reflected inertia and motor chassis inertia” in the nomenclature, J_sc + J_m "
@@ -48,15 +42,15 @@ def circuit() -> Iterator[PaperFinding]:
         "Mu_1 = N + 1 = 502 and Mu_2 = −1 leave the sense of the rotor to the polarity dots of Fig. 8, "
         "which we have not seen. The three-port makes T_p − T_d = (J_sc ± J_m/N) q̈ where Eqs. (5) to (7) "
         f"have J_sc alone: J_m/N is {spin:.4f} kg·m², {100 * spin / j_sc:.0f} % of J_sc, so {forward:.1f} "
-        f"or {backward:.1f} Hz for the {pure_torque_bandwidth(k_s, j_sc):.1f} Hz of Eq. (7).",
+        f"or {backward:.1f} Hz for the {transfer.pure_torque_bandwidth(k_s, j_sc):.1f} Hz of Eq. (7).",
     )  # fmt: skip
 
 
 def equations() -> Iterator[PaperFinding]:
-    k_s, j_sc, b_s = (claims.table_2(n) for n in ("K_s", "J_sc", "b_s"))
+    k_s, j_sc, b_s = (formulas.table_2(n) for n in ("K_s", "J_sc", "b_s"))
     eq_6 = formulas.eq_6_distal_per_proximal(k_s, j_sc, b_s)
-    peak_hz, peak_db = resonance_peak(eq_6)
-    lumped = pure_torque_bandwidth(k_s, claims.table_2("J_m") + j_sc)
+    peak_hz, peak_db = transfer.resonance_peak(eq_6)
+    lumped = transfer.pure_torque_bandwidth(k_s, formulas.table_2("J_m") + j_sc)
     yield PaperFinding(
         "found", "2.3.1, Eqs. (4) and (5)",
         "b_m is b_rotor N² by the line above Eq. (1), and is multiplied by N² once more in both equations. "
@@ -71,23 +65,24 @@ def equations() -> Iterator[PaperFinding]:
     yield PaperFinding(
         "silent", "Eq. (3) and Eq. (7)",
         f"The rule of Eq. (7) on the lumped Eq. (3) gives {lumped:.2f} Hz where Eq. (6) gives "
-        f"{pure_torque_bandwidth(k_s, j_sc):.1f} Hz: the strongest number for the unlumped model, and not "
-        "printed.",
+        f"{transfer.pure_torque_bandwidth(k_s, j_sc):.1f} Hz: the strongest number for the unlumped model, "
+        "and not printed.",
     )  # fmt: skip
     yield PaperFinding(
         "silent", "Eq. (7)",
         "Undamped; the paper says that it ignores some subtleties. With Table 2's b_s = 3 N·m·s/rad |Eq. "
         f"(6)| peaks at {peak_db:+.2f} dB ({peak_hz:.1f} Hz), never reaches +3 dB and falls below −3 dB at "
-        f"{flat_band(eq_6):.1f} Hz; its phase passes −10° at {flat_band(eq_6, 3.0, 10.0):.1f} Hz.",
+        f"{transfer.flat_band(eq_6):.1f} Hz; its phase passes −10° at "
+        f"{transfer.flat_band(eq_6, 3.0, 10.0):.1f} Hz.",
     )  # fmt: skip
-    nominal = formulas.eq_9_spring_stiffness(claims.SPRING_RATE, claims.ARM, 0.0)
+    nominal = formulas.eq_9_spring_stiffness(formulas.SPRING_RATE, formulas.ARM, 0.0)
     yield PaperFinding(
         "unclear", "3.1, Eqs. (8) and (9)",
         f"Two pairs of opposing springs are four. Preloaded, all four act: 4 K, at least {2 * nominal:.0f} "
         f"N·m/rad. Eq. (8) has 2 K, at least {nominal:.0f} N·m/rad, so two act at a time or K counts a "
         f"pair. The measured {k_s:.0f} N·m/rad speak for 2 K; preload is not mentioned.",
     )  # fmt: skip
-    radius = spring_radius(1690.5, claims.SPRING_RATE, claims.ARM)
+    radius = spring_radius(1690.5, formulas.SPRING_RATE, formulas.ARM)
     yield PaperFinding(
         "silent", "Eq. (9)",
         f"The spring radius r_s is not printed. K_s = 1690.5 N·m/rad needs {1e3 * radius:.1f} mm; the "
@@ -106,7 +101,7 @@ def findings() -> tuple[PaperFinding, ...]:
 
 def identification() -> Iterator[PaperFinding]:
     c_0, _, c_2 = formulas.EQ_10
-    k_s = claims.table_2("K_s")
+    k_s = formulas.table_2("K_s")
     yield PaperFinding(
         "found", "Eq. (10)",
         f"The same K_s/J_eff is {c_0} in the numerator and {c_2} in the denominator, "
@@ -123,12 +118,12 @@ def identification() -> Iterator[PaperFinding]:
         f"K_s: J_eff is {k_s / c_0:.3f} or {k_s / c_2:.3f} kg·m² by the one or the other K_s/J_eff, and "
         f"with the nominal K_s {1690.5 / (0.5 * (c_0 + c_2)):.3f} kg·m².",
     )  # fmt: skip
-    bound = claims.TORQUE_CONSTANT * claims.NO_LOAD_CURRENT / claims.NO_LOAD_SPEED
+    bound = formulas.TORQUE_CONSTANT * formulas.NO_LOAD_CURRENT / formulas.NO_LOAD_SPEED
     yield PaperFinding(
         "silent", "Table 2, b_m",
         "23.088 N·m·s/rad cannot be viscous drag: at the no-load speed of 33.1 rpm it would take "
-        f"{23.088 * claims.NO_LOAD_SPEED:.0f} N·m, the maker's no-load current of 1.65 A makes "
-        f"{bound * claims.NO_LOAD_SPEED:.0f} N·m, at most {bound:.1f} N·m·s/rad. Most of it is likely dry "
+        f"{23.088 * formulas.NO_LOAD_SPEED:.0f} N·m, the maker's no-load current of 1.65 A makes "
+        f"{bound * formulas.NO_LOAD_SPEED:.0f} N·m, at most {bound:.1f} N·m·s/rad. Most of it is likely dry "
         "friction, linearised at the test's amplitude; the paper names static friction only as the reason "
         "for the added noise.",
     )  # fmt: skip
@@ -153,10 +148,10 @@ def identification() -> Iterator[PaperFinding]:
 def moving_output() -> Iterator[PaperFinding]:
     rig = load_rig("paper_moving_output")
     at = np.array([10.0, 19.0, 33.0])
-    gains = 20.0 * np.log10(np.abs(end_response(rig, at)))
+    gains = 20.0 * np.log10(np.abs(transfer.end_response(rig, at)))
     _, moving, grounded = readings(rig).values()
     gap_hz, gap = largest_gap(rig, grounded)
-    stiffness = claims.PENDULUM_MASS * STANDARD_GRAVITY * claims.PENDULUM_LENGTH
+    stiffness = formulas.PENDULUM_MASS * STANDARD_GRAVITY * formulas.PENDULUM_LENGTH
     yield PaperFinding(
         "unclear", "3.2.2, Figs. 16 and 18",
         "The lumped model of Fig. 18 can be read in two ways: only the parts within the inner line "
@@ -199,7 +194,7 @@ def moving_output() -> Iterator[PaperFinding]:
 
 
 def prototype() -> Iterator[PaperFinding]:
-    k_s, j_sc, torque = claims.PROTOTYPE_STIFFNESS, claims.PROTOTYPE_INERTIA, claims.KNEE_TORQUE
+    k_s, j_sc, torque = formulas.PROTOTYPE_STIFFNESS, formulas.PROTOTYPE_INERTIA, formulas.KNEE_TORQUE
     yield PaperFinding(
         "found", "4.1 and Eq. (8)",
         f"By Eq. (8) a mechanism of {k_s:.0f} N·m/rad carries at most K_s/2 = {k_s / 2:.0f} N·m, at 45°: "
@@ -213,18 +208,17 @@ def prototype() -> Iterator[PaperFinding]:
         "N·m/rad.",
     )  # fmt: skip
     rig = load_rig("prototype_knee")
-    backward, forward = (
-        float(undamped_band(k_s, inner_inertia(replace(rig, train=t)))) for t in claims.PROTOTYPE_TRAINS
-    )
+    inner = (transfer.inner_inertia(replace(rig, train=train)) for train in formulas.PROTOTYPE_TRAINS)
+    backward, forward = (float(transfer.undamped_band(k_s, j)) for j in inner)
     yield PaperFinding(
         "unclear", "4.1 and Eqs. (5) to (7)",
         "Neither the rotor's inertia nor which spline of the harmonic drive is held is printed. With our "
         f"estimate of J_m = {rig['rotor.reflected_inertia']:.1f} kg·m² the rotor's spin is "
         f"{rig['rotor.reflected_inertia'] / rig['gear.ratio'] / j_sc:.0f} times J_sc: {backward:.1f} Hz "
         f"with the circular spline held (n = −160), {forward:.1f} Hz with the flexspline held (n = +161), "
-        f"instead of {pure_torque_bandwidth(k_s, j_sc):.1f} Hz.",
+        f"instead of {transfer.pure_torque_bandwidth(k_s, j_sc):.1f} Hz.",
     )  # fmt: skip
-    radius = spring_radius(k_s, claims.PROTOTYPE_RATE, claims.PROTOTYPE_ARM)
+    radius = spring_radius(k_s, formulas.PROTOTYPE_RATE, formulas.PROTOTYPE_ARM)
     yield PaperFinding(
         "silent", "4.1",
         f"Neither r_s ({1e3 * radius:.1f} mm by Eq. (9)), nor damping, nor the body in the ADAMS run are "
@@ -240,7 +234,7 @@ def clamp_error() -> float:
     }
     loose = replace(rig, clamped=frozenset(), quantities={**rig.quantities, **values})
     hz = np.geomspace(0.1, 140.0, 200)
-    clamped, free = (end_response(r, hz) for r in (rig, loose))
+    clamped, free = (transfer.end_response(r, hz) for r in (rig, loose))
     return float(np.max(np.abs(free / clamped - 1.0)))
 
 

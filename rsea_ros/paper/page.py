@@ -10,8 +10,8 @@ from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.transfer import inner_inertia, pure_torque_bandwidth
 from rsea_ros.paper import figures
 from rsea_ros.paper.bands import TOLERANCES, Arrangement, Bands, Limit, arrangements, bands, limits
-from rsea_ros.paper.claims import PROTOTYPE_TRAINS, TABLE_2, PaperClaim, PaperFinding, claims
 from rsea_ros.paper.findings import findings
+from rsea_ros.paper.formulas import PROTOTYPE_TRAINS, TABLE_2, PaperClaim, PaperFinding, claims
 from rsea_ros.paper.rival_models import MovingOutput, lumped_rig as lumped_model
 from rsea_ros.report import page as html, words
 from rsea_ros.report.result_files import pick, strict

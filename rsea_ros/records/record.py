@@ -308,7 +308,12 @@ def record_from_arrays(t: npt.ArrayLike, source: str, channels: Mapping[str, npt
         if y.shape != stamps.shape:
             raise ChannelError(f"{source}: {name} has {len(y)} values for {len(stamps)} stamps in t")
     _check_finite("t", "s", stamps, source)
-    _check_stamps(stamps, source)
+    wrong = np.flatnonzero(~(np.diff(stamps) > 0.0))
+    if len(wrong):
+        k = int(wrong[0]) + 1
+        raise ChannelError(
+            f"{source}: t[{k}] = {stamps[k]:g} s after {stamps[k - 1]:g} s, expected stamps that rise"
+        )
     if "command" in values:
         _check_finite("command", UNITS["command"], values["command"], source)
     return Record({name: Channel(stamps - stamps[0], y) for name, y in values.items()}, source)
@@ -341,8 +346,7 @@ def _vector(name: str, values: npt.ArrayLike, source: str) -> FloatArray:
         raise ChannelError(
             f"{source}: {name} has shape {numbers.shape}, expected (n,) with n >= {FEWEST} samples"
         )
-    filled: FloatArray = numbers.filled(np.nan)
-    return filled
+    return np.asarray(numbers.filled(np.nan))
 
 
 def torques_from(name: str, values: npt.ArrayLike, fewest: int) -> FloatArray:
@@ -358,15 +362,6 @@ def torques_from(name: str, values: npt.ArrayLike, fewest: int) -> FloatArray:
 def _check_finite(name: str, unit: str, values: FloatArray, source: str) -> None:
     for k in np.flatnonzero(~np.isfinite(values))[:1]:
         raise ChannelError(f"{source}: {name}[{k}] = {values[k]}, expected a finite value in {plain(unit)}")
-
-
-def _check_stamps(stamps: FloatArray, source: str) -> None:
-    wrong = np.flatnonzero(~(np.diff(stamps) > 0.0))
-    if len(wrong):
-        k = int(wrong[0]) + 1
-        raise ChannelError(
-            f"{source}: t[{k}] = {stamps[k]:g} s after {stamps[k - 1]:g} s, expected stamps that rise"
-        )
 
 
 def _column(table: NamedColumns, column: str, source: str) -> Any:

@@ -11,7 +11,7 @@ from rich.text import Text
 from rsea_ros.checks.finding import Finding, Findings, worst
 from rsea_ros.checks.pairs import Pair
 from rsea_ros.documents.wording import list_names
-from rsea_ros.outputs.new_files import Destination, NewFiles
+from rsea_ros.outputs.files import Destination, NewFiles
 from rsea_ros.records.record import UNITS, Record
 from rsea_ros.records.stamps import repair_stamps
 from rsea_ros.report import page as html, result_files as outputs, words

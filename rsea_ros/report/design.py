@@ -197,10 +197,10 @@ def trains_table(rows: Sequence[WithTrain], d: SpringDesign) -> Html:
     """Return the design with every possible train of the unit, and the range left by J_m."""
     shown = listed(
         rows,
-        ("Train", lambda row: words.train(row.train)),
-        ("#n", lambda row: words.signed_text(row.turns, 0)),
-        ("#J_sc + n J_r, g·m²", lambda row: words.signed_text(1e3 * row.inner, 2)),
-        (f"#±3 dB with K_s = {d.stiffness:.0f}, Hz", lambda row: words.hertz(row.band)),
+        ("Train", lambda row: words.train(row.design.unit.train)),
+        ("#n", lambda row: words.signed_text(row.design.unit.turns, 0)),
+        ("#J_sc + n J_r, g·m²", lambda row: words.signed_text(1e3 * row.design.inner, 2)),
+        (f"#±3 dB with K_s = {d.stiffness:.0f}, Hz", lambda row: words.hertz(row.design.band_exact)),
         ("#90 % of J_m, Hz", lambda row: " to ".join(words.hertz(v) for v in row.band_range)),
         (f"#K_s for {d.requirement.bandwidth:g} Hz, N·m/rad", lambda row: f"{row.for_band:.0f}"),
         ("#K_s for all demands", lambda row: f"{row.least:.0f}"),
@@ -265,9 +265,9 @@ def design_json(asked: SpringDesign, least: SpringDesign, robust: SpringDesign |
     """Return the result file. Angles in rad; null where a design cannot carry the torque."""
     r = asked.requirement
     train = (
-        "train turns inner_inertia=inner bandwidth_exact_hz=band "
-        "bandwidth_hz_90_percent_of_rotor_inertia=band_range least_stiffness_for_bandwidth=for_band "
-        "least_stiffness=least"
+        "train=design.unit.train turns=design.unit.turns inner_inertia=design.inner "
+        "bandwidth_exact_hz=design.band_exact bandwidth_hz_90_percent_of_rotor_inertia=band_range "
+        "least_stiffness_for_bandwidth=for_band least_stiffness=least"
     )
     return {
         "schema": 1, **pick(asked, "requirement unit=unit.name train=unit.train"),

@@ -19,7 +19,7 @@ from rsea_ros.experiment.proposal import LEVEL, Proposal
 from rsea_ros.experiment.run_shape import UNITS, RunLimits, run_text
 from rsea_ros.model.rig import CLOCK_DOUBT
 from rsea_ros.model.rig_file import rig_text
-from rsea_ros.outputs.new_files import NewFiles, check_free
+from rsea_ros.outputs.files import NewFiles, check_free
 from rsea_ros.records.record import FloatArray
 from rsea_ros.records.statistics import Z95
 from rsea_ros.report import words

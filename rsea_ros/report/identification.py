@@ -13,7 +13,7 @@ from rsea_ros.documents.wording import list_names
 from rsea_ros.identification.identify import explained_by_lost_cycles
 from rsea_ros.identification.result import CLOCKS, Identification, Overlay, ParameterEstimate, Remark, Statics
 from rsea_ros.model.rig_file import rig_text
-from rsea_ros.outputs.new_files import Destination, NewFiles
+from rsea_ros.outputs.files import Destination, NewFiles
 from rsea_ros.records.record import SENSED, UNITS, FloatArray
 from rsea_ros.records.statistics import Z95
 from rsea_ros.report import page as html, remark_words as remarks, result_files as outputs, words

@@ -10,7 +10,7 @@ import numpy as np
 from rsea_ros.effects.catalogue import lend
 from rsea_ros.laws.law import Law, LawResult, WrittenLaw, about_of, equation_of
 from rsea_ros.model.rig_file import rig_text
-from rsea_ros.outputs.new_files import Destination, NewFiles
+from rsea_ros.outputs.files import Destination, NewFiles
 from rsea_ros.records.record import UNITS, FloatArray
 from rsea_ros.records.statistics import Z95
 from rsea_ros.report import page as html, words
@@ -54,7 +54,15 @@ def _blocks(result: LawResult) -> Iterator[html.Block]:
         yield overlay_figure("The same over time", *missing, s.t, s.values, curves)
     if result.dependences:
         yield _dependences(result)
-    yield _gain(result)
+    plain = "Residual, RMS, on blocks of time that took part in no fit."
+    shown = html.listed(
+        result.before,
+        ("Channel", words.channel),
+        ("#without", lambda n: words.quantity(result.before[n], UNITS[n], 3)),
+        ("#with the law", lambda n: words.quantity(result.after[n], UNITS[n], 3)),
+        ("#noise", lambda n: words.quantity(result.noise[n], UNITS[n], 3)),
+    )
+    yield html.section("Gain", shown, caption=gain_sentence(result) if result.laws else plain)
     if result.tried:
         yield _tried(result)
     if result.laws:
@@ -86,18 +94,6 @@ def _dependences(result: LawResult) -> html.Html:
         caption="Laws without a form, a spline or a memory each, fitted to some blocks of time and judged on "
         "others: share of the power above the noise that they take.",
     )  # fmt: skip
-
-
-def _gain(result: LawResult) -> html.Html:
-    plain = "Residual, RMS, on blocks of time that took part in no fit."
-    shown = html.listed(
-        result.before,
-        ("Channel", words.channel),
-        ("#without", lambda n: words.quantity(result.before[n], UNITS[n], 3)),
-        ("#with the law", lambda n: words.quantity(result.after[n], UNITS[n], 3)),
-        ("#noise", lambda n: words.quantity(result.noise[n], UNITS[n], 3)),
-    )
-    return html.section("Gain", shown, caption=gain_sentence(result) if result.laws else plain)
 
 
 def _tried(result: LawResult) -> html.Html:
@@ -178,8 +174,7 @@ def _in_bins(x: FloatArray, y: FloatArray, law: FloatArray) -> FloatArray:
         values, few = y[which == k], np.sum(which == k) < _FEWEST
         mean = (np.nan, np.nan) if few else (values.mean(), Z95 * values.std() / np.sqrt(len(values)))
         rows.append((0.5 * (edges[k] + edges[k + 1]), *np.quantile(law[which == k], (0.1, 0.9)), *mean))
-    shown: FloatArray = np.array(rows).T
-    return shown
+    return np.asarray(np.array(rows).T)
 
 
 _CLEARLY = 0.1

@@ -83,7 +83,10 @@ def _of_trend(trend: Trend) -> Iterator[Alarm]:
     every = [list(run) for _, run in groupby(trend.changes, lambda change: change.size.value > 0.0)]
     level = trend.first.value if trend.first is not None else float("nan")
     for number, run in enumerate(every, 1):
-        total = _together([c.size for c in run])
+        sizes = [c.size for c in run]
+        value = sum(s.value for s in sizes)
+        half = 0.5 * float(np.sqrt(sum((s.high - s.low) ** 2 for s in sizes)))
+        total = Interval(value, value - half, value + half)
         way = "higher" if total.value > 0.0 else "lower"
         goes_on = trend.state == "trending" and number == len(every) and run[-1].kind == "ramp"
         row = run[0].row
@@ -94,12 +97,6 @@ def _of_trend(trend: Trend) -> Iterator[Alarm]:
             str(s.recording[row]), str(s.artefacts[row]), from_first=run[0].open_start,
         )  # fmt: skip
         level += total.value
-
-
-def _together(sizes: list[Interval]) -> Interval:
-    value = sum(s.value for s in sizes)
-    half = 0.5 * float(np.sqrt(sum((s.high - s.low) ** 2 for s in sizes)))
-    return Interval(value, value - half, value + half)
 
 
 def _of_appearance(a: Appearance, recordings: Table) -> Alarm:

@@ -69,8 +69,7 @@ def outliers(time_s: FloatArray, value: FloatArray, sd: FloatArray, most: float)
 
 def _are_far(off: FloatArray, sd: FloatArray, most: float) -> BoolArray:
     spread = MAD_TO_SD * float(np.median(np.abs(off)))
-    far: BoolArray = np.abs(off) > most * np.sqrt(spread**2 + sd**2)
-    return far
+    return np.asarray(np.abs(off) > most * np.sqrt(spread**2 + sd**2))
 
 
 def _on_lines(time_s: FloatArray, value: FloatArray) -> FloatArray:

@@ -7,29 +7,18 @@ import numpy as np
 from scipy.stats import t as student
 
 from rsea_ros.records.statistics import MAD_TO_SD, Z95
-from rsea_ros.trends import course as courses
+from rsea_ros.trends import course as courses, series as ts
 from rsea_ros.trends.appearing import adjust, appearances, scan_threshold, with_course
 from rsea_ros.trends.course_search import Tested, change_test, describe, end_share
 from rsea_ros.trends.days import DayEffect, Days, day_effect, day_means, fleet_prior
 from rsea_ros.trends.result import Change, FleetTrends, Interval, Outlier, ParameterCourse, Trend
-from rsea_ros.trends.series import (
-    DAY,
-    DEFAULT,
-    YEAR,
-    Series,
-    Table,
-    TrendSettings,
-    all_series,
-    cause_sizes,
-    namings,
-)
 
 _POINTS = 24
 """Places at which a course is drawn, beside its steps."""
 
 
 def trend_of(
-    series: Series, test: Tested, course: courses.Course, q: float, settings: TrendSettings
+    series: ts.Series, test: Tested, course: courses.Course, q: float, settings: ts.TrendSettings
 ) -> Trend:
     """Return the trend of a course. course: the one without a change for a series that is noise."""
     scale, whole = course.days.scale, courses.date_course(course, settings.date_doubt)
@@ -48,7 +37,7 @@ def trend_of(
         q,
         first,
         now,
-        per_year=slope.times(scale * YEAR),
+        per_year=slope.times(scale * ts.YEAR),
         day_sd=scale * float(np.sqrt(course.day_variance)),
         detectable=detectable,
         changes=changes,
@@ -66,7 +55,7 @@ def _per_kelvin(course: courses.Course) -> Interval | None:
     return Interval(*(v + course.warm for v in courses.combine(r, np.eye(r.x.shape[1])[1])))
 
 
-def _detectable(course: courses.Course, freedom: int, settings: TrendSettings) -> float:
+def _detectable(course: courses.Course, freedom: int, settings: ts.TrendSettings) -> float:
     """Return the least step at mid-series that would stand out, relative to the scale."""
     t = course.t
     longer = course.base.with_columns(courses.term("step", t, t[len(t) // 2])[:, None])
@@ -74,11 +63,11 @@ def _detectable(course: courses.Course, freedom: int, settings: TrendSettings) -
     return b * float(np.sqrt(longer.covariance[-1, -1]))
 
 
-def _changes(series: Series, whole: courses.Dated) -> Iterator[Change]:
+def _changes(series: ts.Series, whole: courses.Dated) -> Iterator[Change]:
     """Yield the steps, and the ramps from their beginning; the end of a ramp is not a separate change."""
     course, scale = whole.course, whole.course.days.scale
     if course.slope and courses.is_sure(whole.interval(courses.slope_after(-1))):
-        t = float(course.days.t[0]) * DAY
+        t = float(course.days.t[0]) * ts.DAY
         yield Change("ramp", t, t, t, whole.interval(courses.ramp_size(-1)).times(scale), True)
     for i, k in enumerate(course.terms):
         if k.kind == "step":
@@ -87,13 +76,13 @@ def _changes(series: Series, whole: courses.Dated) -> Iterator[Change]:
             yield _change(series, whole, i, whole.interval(courses.ramp_size(i)).times(scale))
 
 
-def _change(series: Series, whole: courses.Dated, i: int, size: Interval) -> Change:
+def _change(series: ts.Series, whole: courses.Dated, i: int, size: Interval) -> Change:
     """Return a change; a step lies between the day that shows it first and the one before."""
     t, k, (first, last) = whole.course.days.t, whole.course.terms[i], whole.ranges[i]
     before = max(0, k.index - 1) if k.kind == "step" else k.index
-    since = 0.5 * float(t[before] + t[k.index]) * DAY
-    row = int(np.searchsorted(series.time_s, np.floor(t[k.index]) * DAY))
-    earliest, latest = float(t[max(0, first - 1)]) * DAY, float(t[last]) * DAY
+    since = 0.5 * float(t[before] + t[k.index]) * ts.DAY
+    row = int(np.searchsorted(series.time_s, np.floor(t[k.index]) * ts.DAY))
+    earliest, latest = float(t[max(0, first - 1)]) * ts.DAY, float(t[last]) * ts.DAY
     return Change(k.kind, since, earliest, latest, size, False, min(row, len(series.time_s) - 1))
 
 
@@ -104,7 +93,7 @@ def _curve(course: courses.Course) -> ParameterCourse:
     grid = np.unique(np.concatenate([np.linspace(t[0], t[-1], _POINTS), edges]))
     levels = [courses.combine(r, courses.level_row(course, float(at))) for at in grid]
     values = np.array(levels) * course.days.scale
-    return ParameterCourse((course.days.t[0] + grid) * DAY, values[:, 0], values[:, 1], values[:, 2])
+    return ParameterCourse((course.days.t[0] + grid) * ts.DAY, values[:, 0], values[:, 1], values[:, 2])
 
 
 def _by_day(course: courses.Course) -> ParameterCourse:
@@ -112,10 +101,10 @@ def _by_day(course: courses.Course) -> ParameterCourse:
     days, r = course.days, course.regression()
     value = (course.base.y - r.x[:, 1 : course.at] @ r.coefficients[1 : course.at]) * days.scale
     half = Z95 * np.sqrt(days.variance) * days.scale
-    return ParameterCourse(days.t * DAY, value, value - half, value + half)
+    return ParameterCourse(days.t * ts.DAY, value, value - half, value + half)
 
 
-def _with_limit(trend: Trend, whole: courses.Dated, settings: TrendSettings) -> Trend:
+def _with_limit(trend: Trend, whole: courses.Dated, settings: ts.TrendSettings) -> Trend:
     """Return the trend with its limit in the direction of its slope, and the date of reaching it."""
     assert trend.first is not None and trend.per_year is not None
     side = abs(trend.first.value) * settings.limit
@@ -126,7 +115,7 @@ def _with_limit(trend: Trend, whole: courses.Dated, settings: TrendSettings) -> 
     return replace(trend, limit=limit, to_limit_s=when)
 
 
-def outliers(trends: Iterable[Trend], settings: TrendSettings) -> tuple[Outlier, ...]:
+def outliers(trends: Iterable[Trend], settings: ts.TrendSettings) -> tuple[Outlier, ...]:
     """Return the joints whose present level is far from the fleet's median, in spreads of the fleet.
 
     Spread: median absolute deviation of the others' levels, together with the joint's own doubt.
@@ -159,15 +148,17 @@ def _score(group: list[Trend]) -> list[tuple[Trend, float, float, int]]:
 Key = tuple[str, str]
 
 
-def fleet_trends(history: Table, recordings: Table, settings: TrendSettings = DEFAULT) -> FleetTrends:
+def fleet_trends(
+    history: ts.Table, recordings: ts.Table, settings: ts.TrendSettings = ts.DEFAULT
+) -> FleetTrends:
     """Return the trends of a fleet.
 
     history: a row for each joint, recording and parameter, columns series.HISTORY; recordings: a row for each
     joint and recording, columns series.RECORDINGS, faults and causes as in the store's rows.
     Raises ParameterError for a table without its columns.
     """
-    every, parameters = list(namings(recordings)), list(all_series(history))
-    sized = list(cause_sizes(every, history, recordings))
+    every, parameters = list(ts.namings(recordings)), list(ts.all_series(history))
+    sized = list(ts.cause_sizes(every, history, recordings))
     trends, priors = _trends([*parameters, *sized], settings)
     of_parameters = {(s.joint, s.parameter): trends[s.joint, s.parameter] for s in parameters}
     of_causes = {(s.joint, s.parameter): trends[s.joint, s.parameter] for s in sized}
@@ -189,11 +180,11 @@ def fleet_trends(history: Table, recordings: Table, settings: TrendSettings = DE
 
 
 def _trends(
-    all_of: Sequence[Series], settings: TrendSettings
+    all_of: Sequence[ts.Series], settings: ts.TrendSettings
 ) -> tuple[dict[Key, Trend], dict[str, tuple[float, float]]]:
     """Return the trend of each series, and the temperature slope of each parameter over the fleet."""
     out: dict[Key, Trend] = {}
-    ready: list[tuple[Series, Days, DayEffect]] = []
+    ready: list[tuple[ts.Series, Days, DayEffect]] = []
     effects: dict[str, list[DayEffect]] = {}
     for series in all_of:
         days = day_means(series, settings)

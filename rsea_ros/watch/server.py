@@ -99,7 +99,13 @@ class Server:
     ) -> None:
         self._source, self._runs = source, runs
         self.desk = Desk(commander, runs)
-        self._socket = _listen(host, port)
+        family = socket.AF_INET6 if ":" in host else socket.AF_INET
+        try:
+            made = socket.create_server((host, port), family=family)
+        except OSError as error:
+            raise RseaError(f"page on {host}, port {port}: {error.strerror or error}") from None
+        made.setblocking(False)
+        self._socket = made
         self.port: int = self._socket.getsockname()[1]
         self.access = Access(f"rsea_watch_{self.port}")  # a cookie belongs to a host, not to a port
         self.addresses: Sequence[str] = addresses(host, self.port, self.access.token)
@@ -156,14 +162,3 @@ class Server:
         if now >= self._state_due:
             self._state_due, state = now + STATE, self.desk.state(self._source.state())
         self.desk.send(frame(self._source.take(), self._source.flag), state)
-
-
-def _listen(host: str, port: int) -> socket.socket:
-    """Return a socket that listens. Raises RseaError where it cannot."""
-    family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    try:
-        made = socket.create_server((host, port), family=family)
-    except OSError as error:
-        raise RseaError(f"page on {host}, port {port}: {error.strerror or error}") from None
-    made.setblocking(False)
-    return made

@@ -11,6 +11,7 @@ from rsea_ros.checks.pairs import Pair, laws
 from rsea_ros.checks.verdicts import factors, in_step, start_of, verdict_findings
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.records.record import Channel, Record
+from rsea_ros.report.check import sentence
 
 RIG = load_rig("paper_high_impedance")
 T = np.arange(100) / 10.0
@@ -122,9 +123,9 @@ def test_two_channels_alone_contradict_each_other_and_convict_nobody() -> None:
     found, late = verdict_findings(two, RIG, "z")
     assert told(found) == {("contradiction", "velocity", "amber")} and late == {}
     (one,) = found
-    assert one.value == pytest.approx(3.5) and one.unit == "1"
-    said = "-3.5 times the rate of the position, 80 ms behind it, coherence 0.98, from 0 s to 10 s"
-    assert one.detail == said
+    assert one.value == pytest.approx(-3.5) and one.unit == "1"
+    said = "−3.50 times the rate of the position, 80 ms behind it, coherence 0.98, from 0 s to 10 s"
+    assert sentence(one).startswith(f"amber: contradiction velocity: {said}; expected 1, in step")
 
 
 def test_a_fit_begins_with_what_the_pairs_measure() -> None:

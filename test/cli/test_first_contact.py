@@ -14,7 +14,7 @@ from rsea_ros.cli import main as cli
 from rsea_ros.errors import OutputError
 from rsea_ros.model.rig import Sensor
 from rsea_ros.model.rig_file import load_rig, save_rig
-from rsea_ros.outputs.new_files import NewFiles
+from rsea_ros.outputs.files import NewFiles
 from rsea_ros.report.check import check_lines
 
 

@@ -112,11 +112,12 @@ def test_the_amplitude_of_a_band_is_limited_by_motor_and_travel():
 
 def test_both_arrangements_of_the_prototypes_drive_are_designed():
     """50 Hz need 1647 N m/rad with the circular spline held, 2759 with the flexspline; all 1728."""
-    held = {row.train: row for row in by_train(PAPER, UNIT, 260.0)}
+    held = {row.design.unit.train: row for row in by_train(PAPER, UNIT, 260.0)}
     circular, flexspline = held.values()
     assert list(held) == ["harmonic_circular_spline_held", "harmonic_flexspline_held"]
-    assert (circular.turns, flexspline.turns) == (-160.0, 161.0)
-    assert [circular.band, flexspline.band] == pytest.approx([19.87, 15.35], abs=0.01)
+    assert (circular.design.unit.turns, flexspline.design.unit.turns) == (-160.0, 161.0)
+    bands = [row.design.band_exact for row in held.values()]
+    assert bands == pytest.approx([19.87, 15.35], abs=0.01)
     assert [circular.for_band, flexspline.for_band] == pytest.approx([1647.0, 2759.0], abs=1.0)
     assert [circular.least, flexspline.least] == pytest.approx([1728.0, 2759.0], abs=1.0)
 
@@ -167,3 +168,12 @@ def test_bad_catalogues_are_refused(tmp_path, text, message):
 def test_impossible_requirements_are_refused(change, message):
     with pytest.raises(ParameterError, match=message):
         replace(PAPER, **change)
+
+
+@pytest.mark.parametrize(
+    ("change", "demand"),
+    [({"torque": 9e5}, "Deflection"), ({"inertia": 1e5}, "Eq. \\(7\\)"), ({"bandwidth": 9e5}, "spin")],
+)
+def test_a_demand_that_no_spring_meets_is_named_and_not_the_stiffness(change, demand):
+    with pytest.raises(ParameterError, match=f"demand .*{demand}. asks for a spring of"):
+        least_stiffness(replace(PAPER, **change), UNIT)

@@ -13,12 +13,13 @@ from rsea_ros.diagnosis.next_experiment import (
     allowed_run,
     amplitude_series,
 )
+from rsea_ros.diagnosis.settings import NextRunSettings
 from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.identification.problem import Problem, case_from
 from rsea_ros.identification.solver import Solution
 from rsea_ros.model.drive import Drive
 from rsea_ros.model.rig import END_NAMES, EffectSetting
-from rsea_ros.model.rig_file import load_rig, rig_names
+from rsea_ros.model.rig_file import load_rig, packaged_names
 from rsea_ros.model.simulation import simulate, synthesize
 from rsea_ros.nodes import driver
 from rsea_ros.nodes._devices import limits_of
@@ -33,7 +34,7 @@ LIKE_OTHERS = {"cycloidal", "prototype_knee", "sea_two_encoders", "separate_stif
 """Rigs of the kind of paper_high_impedance, with other numbers."""
 PAIRS = [
     (rig, "coulomb_friction" if load_rig(rig).rigid_spring else "backlash")
-    for rig in rig_names()
+    for rig in packaged_names()
     if rig not in LIKE_OTHERS
 ]
 
@@ -132,6 +133,15 @@ def test_an_impossible_run_is_not_recommended():
     rig = load_rig("paper_high_impedance")
     uneven = ExcitationSettings(rate=280.03, duration=12.0, noise=0.0)
     assert allowed_run(rig, like(rig), "multisine", uneven, 20.0) is None
+
+
+@pytest.mark.parametrize("duration", [1.0, 3.0])
+def test_a_run_shorter_than_the_usual_period_has_one_period(duration):
+    rig = load_rig("paper_high_impedance")
+    for option in EXCITATIONS:
+        settings = _settings(option, RATE, NextRunSettings(duration=duration))
+        run = allowed_run(rig, like(rig), option.kind, settings, 20.0)
+        assert run is not None and settings.period == duration
 
 
 @pytest.mark.parametrize(

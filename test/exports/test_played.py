@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from rsea_ros.cli.main import main
-from rsea_ros.design.mujoco_model import STEP, mjcf
+from rsea_ros.design.mujoco_model import STEP, model_element
 from rsea_ros.errors import RigError
 from rsea_ros.exports import verification
 from rsea_ros.exports.fmu import export_fmu
@@ -68,11 +68,11 @@ def test_a_nominal_rig_moves_alike_in_mujoco(name, values, train):
 
 def test_a_rig_that_mujoco_cannot_represent_is_refused():
     with pytest.raises(RigError, match="a rigid spring cannot be exported"):
-        mjcf(load_rig("bare_drive"))
+        model_element(load_rig("bare_drive"))
     with pytest.raises(RigError, match="lumped train cannot be exported"):
-        mjcf(lumped_rig(load_rig("paper_moving_output")))
+        model_element(lumped_rig(load_rig("paper_moving_output")))
     with pytest.raises(RigError, match="chassis has inertia 0 kg·m²"):
-        mjcf(load_rig("paper_moving_output").with_values({"chassis.inertia": 0.0}))
+        model_element(load_rig("paper_moving_output").with_values({"chassis.inertia": 0.0}))
 
 
 SHARE = {"spring_hysteresis": 0.25, "stribeck_friction": 0.15, "asymmetric_friction": 0.05}

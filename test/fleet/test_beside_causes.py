@@ -11,7 +11,7 @@ from rsea_ros.diagnosis import diagnose as engine
 from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.fleet.analysis import _diagnose
-from rsea_ros.fleet.row import empty
+from rsea_ros.fleet.store import empty
 from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig

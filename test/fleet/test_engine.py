@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 from fleet_stubs import HIP, KNEE, stub_work
 
-from rsea_ros.fleet import FleetError, engine as engines, row as compaction
+from rsea_ros.fleet import FleetError, engine as engines, store as compaction
 from rsea_ros.fleet.engine import ATTEMPTS, Engine, EngineLimits
 from rsea_ros.fleet.pool import Done, Serial, WorkerLost
 from rsea_ros.fleet.query import answer
@@ -143,7 +143,7 @@ def test_a_full_disk_ends_the_run_and_loses_no_row(store, folder, monkeypatch):
 
 
 def test_a_compaction_killed_half_way_leaves_no_row_twice(store, folder, monkeypatch):
-    monkeypatch.setattr("rsea_ros.fleet.row._remove", lambda folder, names: None)
+    monkeypatch.setattr("rsea_ros.fleet.store._remove", lambda folder, names: None)
     run_engine(store, folder)
     monkeypatch.undo()
     assert len(list(store.rows.rglob("*.parquet"))) == 6

@@ -8,8 +8,8 @@ from pyarrow import parquet
 
 from rsea_ros.fleet import FleetError, history, query, recordings
 from rsea_ros.fleet.query import MergedError, answer
-from rsea_ros.fleet.row import read
 from rsea_ros.fleet.sources import Bag
+from rsea_ros.fleet.store import read
 from rsea_ros.fleet.task import Task
 
 COUNT = "SELECT count(*) FROM recordings"

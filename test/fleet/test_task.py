@@ -16,7 +16,7 @@ import pytest
 from msg_adapters import write_record
 from rsea_ros.cli.main import main
 from rsea_ros.fleet.joints import date_in
-from rsea_ros.fleet.row import read
+from rsea_ros.fleet.store import read
 from rsea_ros.fleet.task import Changed, Task, read_fingerprint, work
 from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.model.rig_file import load_rig, rig_text

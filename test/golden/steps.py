@@ -28,7 +28,7 @@ from rsea_ros.exports.others import coverage_lines
 from rsea_ros.laws import terms
 from rsea_ros.laws.effect_source import LawProvenance, source_of
 from rsea_ros.laws.law import FittedTerm, Law, LearntCurve
-from rsea_ros.model.rig_file import rig_names, rig_text
+from rsea_ros.model.rig_file import packaged_names, rig_text
 from rsea_ros.nodes._policies import NODES
 from rsea_ros.report.fleet.page import write_fleet_report
 
@@ -60,7 +60,7 @@ VERBS: dict[str, tuple[str, ...]] = {
     ),
     "lists": ("--help", "rigs", "maps", "effects"),
     "effects": tuple(f"effects {name}" for name in catalogue()),
-    "rigs": ("rig new mine", *(f"rig check {name}" for name in rig_names())),
+    "rigs": ("rig new mine", *(f"rig check {name}" for name in packaged_names())),
     "imported": ("import spoiled.csv --map map.yaml --out imported",),
     "spoiled": ("check imported --rig pendulum", "check imported", "identify imported --json"),
     "spoiled_diagnosis": (f"diagnose imported --json --max-causes 2 --without {NO_PLAY}",),
@@ -269,7 +269,7 @@ def nodes(folder: Path) -> Iterator[str]:
 def exports(folder: Path) -> Iterator[str]:
     """Yield what each target makes of every kind of rig and effect, a line that came before not again."""
     base = rsea.load_rig("paper_moving_output")
-    rigs = {name: rsea.load_rig(name) for name in rig_names()}
+    rigs = {name: rsea.load_rig(name) for name in packaged_names()}
     for name in catalogue():
         rigs[name] = (rigs["pendulum"] if name == "gravity_error" else base).with_effect(name)
     for target in ("mjcf", "urdf", "sdf", "isaac", "bam", "feedforward"):

@@ -32,7 +32,7 @@ def test_the_cost_is_that_of_students_t_and_missing_innovations_cost_nothing():
     assert cost(w) == pytest.approx(float(np.sum(T4.logpdf(0.0) - T4.logpdf(w))))
     assert cost(np.array([0.3, -2.0, 9.0, np.nan])) == cost(w)
     white = integrate.quad(lambda z: (T4.logpdf(0.0) - T4.logpdf(z)) * stats.norm.pdf(z), -9.0, 9.0)[0]
-    assert pytest.approx(white, rel=1e-3) == WHITE
+    assert pytest.approx(white, rel=1e-5) == WHITE
 
 
 @dataclass(frozen=True)

@@ -15,8 +15,8 @@ from rsea_ros.diagnosis.diagnose import nominal_problem
 from rsea_ros.effects.catalogue import catalogue, effect_named, lend
 from rsea_ros.effects.effect import Claims
 from rsea_ros.laws.effect_source import LawProvenance, source_of
-from rsea_ros.laws.file import claims_of, effect_from
 from rsea_ros.laws.law import FittedTerm, Law, LearntCurve
+from rsea_ros.laws.learn import claims_of, effect_from
 from rsea_ros.laws.terms import (
     COMMAND_TERMS,
     GEAR_TERMS,

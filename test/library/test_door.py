@@ -6,6 +6,7 @@ import functools
 import json
 import os
 import pickle
+import pydoc
 import re
 import subprocess
 import sys
@@ -15,7 +16,7 @@ import numpy as np
 import pytest
 
 import rsea_ros as rsea
-from rsea_ros import DOOR
+from rsea_ros import DOOR, STUDIES
 from rsea_ros.control.law import Gains
 from rsea_ros.errors import ChannelError, ParameterError
 from rsea_ros.records.record import Channel
@@ -246,6 +247,12 @@ def test_results_are_short_in_a_notebook(record):
     comparison = rsea.predict("paper_high_impedance", record)["ft"]
     assert repr(comparison).startswith("Comparison(") and len(repr(comparison)) < 100
     assert rsea.check(record, "paper_high_impedance")._repr_html_().startswith("<pre>green")
+
+
+@pytest.mark.parametrize("name", STUDIES)
+def test_the_help_of_a_study_is_that_of_its_function(name):
+    shown = pydoc.render_doc(getattr(rsea, name), renderer=pydoc.plaintext)
+    assert f"{name}(" in shown and "Raises ParameterError" in shown
 
 
 def test_what_is_saved_is_read_back(record, fit, tmp_path):

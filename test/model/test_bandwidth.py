@@ -18,7 +18,7 @@ from rsea_ros.model.transfer import (
     resonance_peak,
     undamped_band,
 )
-from rsea_ros.paper.formulas import EXACT_FACTOR, eq_6_distal_per_proximal
+from rsea_ros.paper.formulas import eq_6_distal_per_proximal
 
 PLATFORM, PROTOTYPE = load_rig("paper_high_impedance"), load_rig("prototype_knee")
 HZ = np.arange(0.001, 400.0, 0.001)
@@ -41,7 +41,7 @@ def test_band_is_where_a_dense_search_first_leaves_it(rig, sees, db, deg):
 def test_undamped_band_at_sqrt_2_is_eq_7_with_the_exact_factor():
     undamped = eq_6_distal_per_proximal(1530.456, 0.004, 0.0)
     assert flat_band(undamped, 20 * math.log10(math.sqrt(2))) == pytest.approx(
-        pure_torque_bandwidth(1530.456, 0.004, EXACT_FACTOR)
+        pure_torque_bandwidth(1530.456, 0.004, 1.0 - math.sqrt(0.5))
     )
 
 

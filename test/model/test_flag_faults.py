@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rsea_ros.model.observer import ErrorModel, Observer, TorqueEstimate
-from rsea_ros.model.observer.signal_noise import consistency
+from rsea_ros.model.observer.assemble import consistency
 from rsea_ros.model.pure_torque_error import ErrorFlag
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.torque_band import TorqueBand

@@ -13,7 +13,7 @@ from rsea_ros.model.observer import TorqueEstimate
 from rsea_ros.model.pure_torque_error import BEYOND, NOTHING, PURE, ErrorFlag, ErrorSettings, edge_of
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.transfer import end_to_end, flat_band
-from rsea_ros.paper.claims import PROTOTYPE_TRAINS
+from rsea_ros.paper.formulas import PROTOTYPE_TRAINS
 
 RATE = 1000.0
 PLATFORM, KNEE = load_rig("paper_high_impedance"), load_rig("prototype_knee")

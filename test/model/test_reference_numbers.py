@@ -57,7 +57,7 @@ def table() -> list[tuple[str, float, float, float]]:
             55.83,
             5e-3,
         ),
-        ("factor of Eq. (7), +3 dB for sqrt(2)", formulas.EXACT_FACTOR, 0.29289, 5e-6),
+        ("factor of Eq. (7), +3 dB for sqrt(2)", 1.0 - 0.5**0.5, 0.29289, 5e-6),
         ("factor of Eq. (7) as printed, +3 dB", 1 - 10 ** (-3 / 20), transfer.PAPER_FACTOR, 5e-4),
         ("Eq. (6), peak, dB", transfer.resonance_peak(eq_6)[1], 0.316, 5e-4),
         ("Eq. (6), peak, Hz", transfer.resonance_peak(eq_6)[0], 50.7, 5e-2),

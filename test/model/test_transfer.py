@@ -132,11 +132,11 @@ def test_lumped_model_is_eqs_1_to_3():
         ),
         (
             proximal_per_motor(rig),
-            formulas.eq_2_lumped_proximal_per_motor(K_S, J_EFF, B_EFF, B_S),
+            transfer.Fraction([J_EFF, B_S, K_S], [J_EFF, B_EFF, K_S]),
         ),
         (
             transfer.distal_per_proximal(rig, "element"),
-            formulas.eq_3_lumped_distal_per_proximal(K_S, J_EFF, B_S),
+            transfer.Fraction([K_S], [J_EFF, B_S, K_S]),
         ),
     ):
         agree(ours(S), printed(S))

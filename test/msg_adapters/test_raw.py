@@ -5,7 +5,7 @@ import math
 import pytest
 from rclpy.serialization import deserialize_message, serialize_message
 
-from msg_adapters.raw import RawReader, RawWriter
+from msg_adapters.cdr import RawReader, RawWriter
 from msg_adapters.ros import (
     JointState,
     efforts_message,

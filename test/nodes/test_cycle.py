@@ -6,7 +6,7 @@ import time
 import numpy as np
 import pytest
 
-from rsea_ros.nodes._cycle import SECOND, Cycle
+from rsea_ros.nodes._cycle import SECOND, Cycle, on_grid
 
 RATE = 200.0
 PERIOD = SECOND / RATE
@@ -67,3 +67,12 @@ def test_what_the_work_raises_is_raised_to_whoever_asks():
     cycle.thread.join(30.0)
     with pytest.raises(ZeroDivisionError):
         cycle.is_running()
+
+
+@pytest.mark.parametrize("age", [3, 3000])
+def test_commands_begin_a_whole_number_of_periods_after_a_measurement(age):
+    """age: of the measurement, ms."""
+    now = 10 * SECOND
+    measured = now - age * 10**6
+    first = on_grid(now, measured, 100.0)
+    assert (first - measured) % (SECOND // 100) == 0 and 0 <= first - now < SECOND // 100

@@ -10,7 +10,7 @@ from msg_adapters.ros import ERROR, OK, WARN, JointState, WrenchStamped, joint_s
 from rsea_ros.errors import ParameterError
 from rsea_ros.health.health_finding import NAMES, HealthFinding
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.nodes._health_inputs import HealthInputs, noise_from
+from rsea_ros.nodes._joint_inputs import HealthInputs, noise_from
 from rsea_ros.nodes._qos import COMMAND
 from rsea_ros.nodes.health import FindingsPublisher, Keeper, Ring
 
@@ -81,7 +81,7 @@ def test_stamps_of_another_time_restart_the_watch(heard, listener):
 
 def test_commands_to_a_joint_that_publishes_nothing_do_not_pile_up(heard, listener, monkeypatch):
     """They wait for measurements of their time: 280 a second for as long as these stopped."""
-    monkeypatch.setattr("rsea_ros.nodes._health_inputs.MOST", 50)
+    monkeypatch.setattr("rsea_ros.nodes._joint_inputs.MOST", 50)
     inputs, _, _, command, _ = heard
     for k in range(120):
         command.publish(joint_state_message(EPOCH + k * PERIOD, 0.0, 0.0, 1.0))

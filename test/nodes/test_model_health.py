@@ -11,7 +11,7 @@ from rsea_ros.model.pure_torque_error import ErrorFlag
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.torque_band import TorqueBand
 from rsea_ros.nodes._health import OK, WARN
-from rsea_ros.nodes._model_health import UNMOVED, ModelHealth
+from rsea_ros.nodes.model import UNMOVED, ModelHealth
 
 RIG = load_rig("paper_high_impedance")
 RATE, NOISE = 280.0, noise_of(RIG)
@@ -182,8 +182,7 @@ def test_the_band_learns_the_noise_where_it_has_settled_or_changed():
     learnt = []
     health._torque_band = SimpleNamespace(calibrate=lambda error, period: learnt.append((error, period)))
     health._observer = SimpleNamespace(error_model=lambda period: f"error at {period}")
-    estimate = health.estimate
     for sigma, period in ((0.1, 0.01), (0.109, 0.0109), (0.112, 0.01), (0.112, 0.0112), (0.112, math.nan)):
-        health._inputs.period, estimate.sigma_distal = period, sigma
-        health._calibrate()
+        health._inputs.period = period
+        health._calibrate(sigma)
     assert learnt == [("error at 0.01", 0.01), ("error at 0.01", 0.01), ("error at 0.0112", 0.0112)]

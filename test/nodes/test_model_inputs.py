@@ -15,7 +15,7 @@ from msg_adapters.ros import (
 )
 from rsea_ros.model.observer import Observer, noise_of
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.nodes._model_inputs import Frozen, InputSettings, ModelInputs, StoppedSensors
+from rsea_ros.nodes._joint_inputs import Frozen, InputSettings, ModelInputs, StoppedSensors
 from rsea_ros.nodes._qos import COMMAND
 
 RIG = load_rig("paper_high_impedance")

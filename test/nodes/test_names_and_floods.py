@@ -15,8 +15,8 @@ from rsea_ros.hardware.device import NoReply
 from rsea_ros.nodes import driver
 from rsea_ros.nodes._anchor import Anchor
 from rsea_ros.nodes._bench_topics import MOST, NAMES, BenchTopics
-from rsea_ros.nodes._model_health import Flags
 from rsea_ros.nodes._qos import COMMAND, LATCHED, MEASUREMENT
+from rsea_ros.nodes.model import Flags
 from test.nodes.test_driver import Spy
 
 VALUES = {parameter.name: parameter.default for parameter in driver.TABLE} | {

@@ -76,14 +76,6 @@ def test_a_page_may_not_command_beside_others_or_without_a_bench(made):
     assert command._reason() == "/a, /b publish joint_states, expected one"
 
 
-def test_commands_begin_a_whole_number_of_periods_after_a_measurement(made):
-    command, _, _ = made
-    for newest in (NOW - 3 * MS, NOW - 3000 * MS):
-        command._source.newest = newest
-        first = command._first()
-        assert (first - newest) % (10 * MS) == 0 and 0 <= first - (NOW + 40 * MS) < 10 * MS
-
-
 def test_a_command_is_published_ahead_and_left_out_where_too_little_is_left(made):
     command, _, out = made
     now = [NOW]

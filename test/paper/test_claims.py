@@ -14,8 +14,8 @@ from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.train import TRAINS
 from rsea_ros.model.transfer import frequency_response
 from rsea_ros.paper.bands import HZ, arrangements, limits
-from rsea_ros.paper.claims import PROTOTYPE_TRAINS, claims, last_digit
 from rsea_ros.paper.findings import clamp_error, findings
+from rsea_ros.paper.formulas import PROTOTYPE_TRAINS, claims, last_digit
 from rsea_ros.paper.rival_models import draw, largest_gap, readings, resonance_hz
 
 

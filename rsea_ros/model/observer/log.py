@@ -14,22 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from rsea_ros.compiler import njit
-from rsea_ros.model.observer.assemble import assemble, without_delay
-from rsea_ros.model.observer.filter import (
-    FORCED,
-    NOW,
-    POSITION,
-    SINCE,
-    STARTED,
-    WRENCH,
-    doubt,
-    inner,
-    once,
-    predict,
-    update,
-    weigh_torque,
-)
-from rsea_ros.model.observer.signal_noise import Noise
+from rsea_ros.model.observer import filter as kf
+from rsea_ros.model.observer.assemble import Noise, assemble, without_delay
 from rsea_ros.model.rig import Rig
 from rsea_ros.records.record import FloatArray, IntArray, Record
 
@@ -67,18 +53,18 @@ def empty_log(size: int) -> Log:
     )
 
 
-@inner
+@kf.inner
 def _row(log, i):  # type: ignore[no-untyped-def]
     return (log.place[FIRST] + i) % LENGTH
 
 
-@inner
+@kf.inner
 def _copy(a, out):  # type: ignore[no-untyped-def]
     for i in range(len(a)):
         out[i] = a[i]
 
 
-@inner
+@kf.inner
 def _insert(log, t, kind, a, b):  # type: ignore[no-untyped-def]
     """Put an event in its place and return that, or NONE where no checkpoint goes back so far."""
     place = log.place
@@ -103,21 +89,21 @@ def _insert(log, t, kind, a, b):  # type: ignore[no-untyped-def]
     return at
 
 
-@once
+@kf.once
 def _apply(model, state, kind, t, values):  # type: ignore[no-untyped-def]
-    if state.clock[STARTED] == 0.0:
-        state.clock[STARTED], state.clock[NOW] = 1.0, t
-    predict(model, state, t)
+    if state.clock[kf.STARTED] == 0.0:
+        state.clock[kf.STARTED], state.clock[kf.NOW] = 1.0, t
+    kf.predict(model, state, t)
     if kind == COMMAND:
-        state.clock[FORCED], state.clock[SINCE] = values[0], t
+        state.clock[kf.FORCED], state.clock[kf.SINCE] = values[0], t
     else:
         if kind == STATE:
-            weigh_torque(model, state, values[1])
-        update(model, state, POSITION if kind == STATE else WRENCH, values[0])
-    doubt(model, state)
+            kf.weigh_torque(model, state, values[1])
+        kf.update(model, state, kf.POSITION if kind == STATE else kf.WRENCH, values[0])
+    kf.doubt(model, state)
 
 
-@once
+@kf.once
 def take_in(model, state, log, t, kind, a, b):  # type: ignore[no-untyped-def]
     """Add an event, process all up to the newest measurement, and return its row, or NONE."""
     at = _insert(log, t, kind, a, b)
@@ -151,20 +137,20 @@ ALIKE = 1e-6
 def _run(model, state, t, kind, values, out):  # type: ignore[no-untyped-def]
     for k in range(len(t)):
         out[k, 0] = out[k, 1] = np.nan
-        if state.clock[STARTED] == 0.0:
-            state.clock[STARTED], state.clock[NOW] = 1.0, t[k]
-        step = t[k] - state.clock[NOW]
+        if state.clock[kf.STARTED] == 0.0:
+            state.clock[kf.STARTED], state.clock[kf.NOW] = 1.0, t[k]
+        step = t[k] - state.clock[kf.NOW]
         near = abs(step - model.held[1]) < ALIKE
-        predict(model, state, state.clock[NOW] + model.held[1] if near else t[k])
+        kf.predict(model, state, state.clock[kf.NOW] + model.held[1] if near else t[k])
         if kind[k] == COMMAND:
-            state.clock[FORCED], state.clock[SINCE] = values[k, 0], t[k]
+            state.clock[kf.FORCED], state.clock[kf.SINCE] = values[k, 0], t[k]
             continue
         for i in range(9):
             state.score[i] = 0.0
-        channel = POSITION if kind[k] == STATE else WRENCH
+        channel = kf.POSITION if kind[k] == STATE else kf.WRENCH
         if kind[k] == STATE:
-            weigh_torque(model, state, values[k, 1])
-        update(model, state, channel, values[k, 0])
+            kf.weigh_torque(model, state, values[k, 1])
+        kf.update(model, state, channel, values[k, 0])
         if state.score[3 * channel + 1] > 0.0:
             out[k, 0] = math.copysign(math.sqrt(state.score[3 * channel]), state.score[3 * channel + 2])
         if state.score[7] > 0.0:

@@ -16,21 +16,16 @@ from numba.extending import intrinsic
 
 from rsea_ros.compiler import njit
 from rsea_ros.errors import check_kind
-from rsea_ros.model.observer.assemble import assemble, without_delay
-from rsea_ros.model.observer.filter import LACK, SIGMA, FilterModel, FilterState, inner
-from rsea_ros.model.observer.log import (
-    COMMAND,
-    FT,
-    LATE,
-    NONE,
-    REFUSED,
-    STATE,
-    Log,
-    empty_log,
-    events_of,
-    take_in,
+from rsea_ros.model.observer import log as logs
+from rsea_ros.model.observer.assemble import (
+    Consistency,
+    Noise,
+    assemble,
+    consistency,
+    noise_of,
+    without_delay,
 )
-from rsea_ros.model.observer.signal_noise import Consistency, Noise, consistency, noise_of
+from rsea_ros.model.observer.filter import LACK, SIGMA, FilterModel, FilterState, inner
 from rsea_ros.model.observer.transition import transition
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.step import Calls, Linear
@@ -39,7 +34,7 @@ from rsea_ros.records.record import HUGE, FloatArray, Record, is_measured
 ADDRESS, ROWS, COLUMNS = range(3)
 
 
-def handle_of(model: FilterModel, state: FilterState, log: Log) -> npt.NDArray[np.int64]:
+def handle_of(model: FilterModel, state: FilterState, log: logs.Log) -> npt.NDArray[np.int64]:
     """Return address and shape of every array, shape (arrays, 3). The arrays must outlive it."""
     return np.array([_row(array) for array in _arrays((model, state, log))], dtype=np.int64)
 
@@ -108,15 +103,15 @@ def _state(h):  # type: ignore[no-untyped-def]
 @inner
 def _log(h):  # type: ignore[no-untyped-def]
     m, v, n = _matrix, _vector, _numbers
-    return Log(v(h, 37), n(h, 38), m(h, 39), m(h, 40), n(h, 41), v(h, 42))
+    return logs.Log(v(h, 37), n(h, 38), m(h, 39), m(h, 40), n(h, 41), v(h, 42))
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def receive(handle, rest, reads_load, hold, t, kind, a, b, estimate):  # type: ignore[no-untyped-def]
     """Process an event; write the estimate of a measurement, shape (6,); return whether there is one."""
     model, state, log = _model(handle, rest, reads_load, hold), _state(handle), _log(handle)
-    row = take_in(model, state, log, t, kind, a, b)
-    if row == NONE:
+    row = logs.take_in(model, state, log, t, kind, a, b)
+    if row == logs.NONE:
         return False
     at = len(state.whole) - len(state.learnt) - len(state.score) - len(state.clock) - len(state.estimate)
     for i in range(len(state.estimate)):
@@ -177,25 +172,25 @@ class Observer:
 
     def command(self, t: float, torque: float) -> None:
         """Add a command (N m) that takes effect at its stamp, which may be ahead of the measurements."""
-        self._take(t, COMMAND, torque, 0.0)
+        self._take(t, logs.COMMAND, torque, 0.0)
 
     def state(self, t: float, position: float, motor_torque: float = math.nan) -> TorqueEstimate | None:
         """Add position (rad) and motor torque (N m, nan if missing); return None for a sample too late."""
-        return self._take(t, STATE, position, motor_torque)
+        return self._take(t, logs.STATE, position, motor_torque)
 
     def ft(self, t: float, torque: float) -> TorqueEstimate | None:
         """Add a torque of the F/T sensor (N m); return None for a sample that is too late."""
-        return self._take(t, FT, torque, 0.0)
+        return self._take(t, logs.FT, torque, 0.0)
 
     @property
     def late(self) -> int:
         """Number of late samples that were inserted at their stamps."""
-        return int(self._log.place[LATE])
+        return int(self._log.place[logs.LATE])
 
     @property
     def refused(self) -> int:
         """Number of samples that came too late."""
-        return int(self._log.place[REFUSED])
+        return int(self._log.place[logs.REFUSED])
 
     def consistency(self) -> dict[str, Consistency]:
         """Return for each channel the innovations since the last call over their expected size."""
@@ -206,8 +201,7 @@ class Observer:
 
     def scores(self) -> FloatArray:
         """Return the sums since the start of which `consistency` takes differences, shape (3, 3)."""
-        scores: FloatArray = self._state.score.reshape(3, 3).copy()
-        return scores
+        return np.array(self._state.score.reshape(3, 3))
 
     def error_model(self, dt: float) -> ErrorModel:
         """Return the error dynamics at a period of dt s, with the present gain K = P h' / r."""
@@ -227,7 +221,7 @@ class Observer:
         self._model, self._state = assemble(
             self._rig, self._noise, hold=self._hold, duration=self._duration, learns=self._learns
         )
-        self._log = empty_log(len(self._state.whole))
+        self._log = logs.empty_log(len(self._state.whole))
         self._handle = handle_of(self._model, self._state, self._log)
         self._rest, self._reads_load = self._model.linear.rest, self._model.linear.reads_load
         self._score, self._newest = np.zeros((3, 3)), math.nan
@@ -235,12 +229,12 @@ class Observer:
 
     def _take(self, t: float, kind: int, a: float, b: float) -> TorqueEstimate | None:
         """Process an event. Values that are not measured (signals.is_measured) are left out, not believed."""
-        if not math.isfinite(t) or (kind == COMMAND and not is_measured(a, HUGE)):
+        if not math.isfinite(t) or (kind == logs.COMMAND and not is_measured(a, HUGE)):
             return None
         a, b = (value if is_measured(value, HUGE) else math.nan for value in (a, b))
         if abs(t - self._newest) > GAP:
             self._begin()
-        if kind == COMMAND:
+        if kind == logs.COMMAND:
             t += self._delay
         elif not t < self._newest:
             self._newest = t
@@ -258,12 +252,12 @@ def observe(observer: Observer, record: Record) -> tuple[FloatArray, FloatArray]
     """
     check_kind("observer", observer, Observer, "an Observer")
     check_kind("record", record, Record, "a Record")
-    wanted, t, rows = (FT if "ft" in record else STATE), [], []
-    for stamp, kind, (a, b) in zip(*(each.tolist() for each in events_of(record)), strict=True):
-        if kind == COMMAND:
+    wanted, t, rows = (logs.FT if "ft" in record else logs.STATE), [], []
+    for stamp, kind, (a, b) in zip(*(each.tolist() for each in logs.events_of(record)), strict=True):
+        if kind == logs.COMMAND:
             observer.command(stamp, a)
             continue
-        estimate = observer.state(stamp, a, b) if kind == STATE else observer.ft(stamp, a)
+        estimate = observer.state(stamp, a, b) if kind == logs.STATE else observer.ft(stamp, a)
         if kind == wanted and estimate is not None:
             t.append(stamp)
             rows.append(estimate)

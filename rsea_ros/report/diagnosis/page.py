@@ -12,7 +12,7 @@ from rsea_ros.identification.result import Overlay
 from rsea_ros.identification.settings import Setting
 from rsea_ros.identification.unknowns import CLOCK, CLOCK_REACH
 from rsea_ros.model.rig_file import rig_text
-from rsea_ros.outputs.new_files import Destination, NewFiles
+from rsea_ros.outputs.files import Destination, NewFiles
 from rsea_ros.records.record import UNITS, Channel, Record
 from rsea_ros.records.statistics import Z95
 from rsea_ros.report import page as html, remark_words as remarks, result_files as outputs, words

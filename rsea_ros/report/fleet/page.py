@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from rsea_ros.documents.wording import list_names
-from rsea_ros.outputs.new_files import Destination, NewFiles
+from rsea_ros.outputs.files import Destination, NewFiles
 from rsea_ros.report.fleet import words as say
 from rsea_ros.report.fleet.joint_page import alarm_table, joint_page, joint_table, undetermined_table
 from rsea_ros.report.fleet.maps import heat_map, naming_map, timeline

@@ -17,8 +17,8 @@ from rsea_ros.diagnosis.result import Cause, CauseParameter, Diagnosis, Experime
 from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.errors import RigError
-from rsea_ros.library.diagnosed import Diagnosed
-from rsea_ros.library.result_figures import overlay_figure
+from rsea_ros.library.notebook import overlay_figure
+from rsea_ros.library.results import Diagnosed
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.records.record import UNITS, Channel, Fault
 from rsea_ros.records.statistics import Z95
