@@ -98,20 +98,10 @@ def design_of(values: Values) -> ControllerDesign:
 def controller_of(values: Values, designed: ControllerDesign, link: LinkShare) -> TorqueController:
     """Return the controller for the parameters. link: what of the link's motion it feeds forward."""
     limits = TorqueLimits(values["torque_limit"], values["slew_limit"], values["ramp"])
-    settings = ControllerSettings(
-        compensate=None if values["compensate"] else (),
-        preview=values["preview"],
-        corner=values["prediction"],
-        learn=values["learn"],
-    )
-    return TorqueController(
-        load_rig(values["rig"]),
-        values["rate"],
-        designed.gains,
-        limits=limits,
-        link=link,
-        settings=settings,
-    )
+    compensate = None if values["compensate"] else ()
+    settings = ControllerSettings(compensate, values["preview"], values["prediction"], values["learn"])
+    rig, rate = load_rig(values["rig"]), values["rate"]
+    return TorqueController(rig, rate, designed.gains, limits=limits, link=link, settings=settings)
 
 
 def summary(designed: ControllerDesign) -> list[str]:

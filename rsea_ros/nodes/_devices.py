@@ -177,16 +177,9 @@ def dynamixel_netft(values: Values, line: Line | None = None) -> Device:
     if values["baud"] not in BAUD_RATES:
         known = ", ".join(map(str, BAUD_RATES))
         raise ParameterError(f"parameter baud = {values['baud']} bit/s, expected one of {known}")
-    motor = MotorConnection(
-        path=values["port"],
-        baud=values["baud"],
-        identity=values["id"],
-        model=values["model"],
-        torque_constant=values["torque_constant"],
-        latency=latency_of(values),
-        watchdog=values["watchdog"],
-        supervisor=values["supervisor"],
-    )
+    alike = ("baud", "model", "torque_constant", "watchdog", "supervisor")
+    own = {name: values[name] for name in alike}
+    motor = MotorConnection(values["port"], identity=values["id"], latency=latency_of(values), **own)
     sensor = SensorConnection(*(values[f"ft_{name}"] for name in ("host", "port", "page_port", "timeout")))
     stiffness = math.inf if rig.rigid_spring else rig["spring.stiffness"]
     return DynamixelNetft(
