@@ -54,6 +54,8 @@ def test_steps_stay_within_the_limit_and_reach_their_value(loop):
     begun = len(loop.commands)
     loop.hold(0.0, lambda: len(loop.commands) > begun + RATE)  # the first one after a pause is no step
     loop.hold(40.0, lambda: abs(loop.wrenches[-1].wrench.torque.z - 40.0) < 0.5)
+    reached = stamp_of(loop.wrenches[-1].header.stamp)  # a busy listener hears what led there later
+    loop.hold(40.0, lambda: stamp_of(loop.commands[-1].header.stamp) > reached)
     torques = np.array([m.effort[0] for m in loop.commands])
     assert 30.0 < np.abs(torques).max() <= 60.0 + 1e-9
     loop.hold(0.0, lambda: abs(loop.wrenches[-1].wrench.torque.z) < 0.5)
