@@ -8,6 +8,7 @@ from contextlib import suppress
 import pytest
 
 from rsea_ros.errors import DeviceError
+from rsea_ros.hardware.device import NoReply
 from rsea_ros.hardware.dynamixel.control_tables import MotorConnection
 from rsea_ros.hardware.dynamixel.line import Line, LineMotor
 from rsea_ros.hardware.dynamixel_netft import DynamixelNetft
@@ -34,7 +35,12 @@ class Three:
             for k in range(3)
         ]
         for member in self.members:
-            member.open()
+            for _ in range(3):
+                with suppress(NoReply):  # of a bench that stands still
+                    member.open()
+                    break
+            else:
+                member.open()
             member.enable()
 
     def cycles(self, count, torques):
