@@ -53,6 +53,8 @@ def test_a_command_acts_one_sample_after_its_measurement(loop):
         ahead.append((command - state) / PERIOD)
         return len(ahead) > 60
 
+    begun = stamp_of(loop.commands[-1].header.stamp)
+    loop.listener.until(lambda: stamp_of(loop.states[-1].header.stamp) >= begun)
     loop.listener.until(look)
     assert np.median(ahead) < 2.5
 
