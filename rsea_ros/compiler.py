@@ -33,7 +33,7 @@ from numba.core import (
 
 SHARED = (
     "effects/_*.py", "effects/effect.py", "effects/signal_table.py", "effects/spring_hysteresis.py",
-    "model/drive.py", "model/step.py",
+    "model/drive.py", "model/pure_torque_error.py", "model/step.py",
     "model/observer/filter.py", "model/observer/log.py", "model/observer/transition.py",
 )  # fmt: skip
 """Files whose functions and constants are compiled into those of other files."""
