@@ -34,8 +34,7 @@ EFFECT = Effect(
     order=10,
     parameters=(
         Parameter(
-            "time_constant", "s", null=0.0, low=1e-5, high=0.1, typical=3e-3, starts=(1e-3, 0.01),
-            logarithmic=True,
+            "time_constant", "s", null=0.0, low=0.0, high=0.1, typical=3e-3, starts=(1e-3, 0.01),
             reason="filters of 1.6 Hz and more; manufacturers offer about 5 to 800 Hz",
         ),
     ),

@@ -15,10 +15,11 @@ from independent.hidden import MAIN_PARAMETER, hide
 from independent.puzzle import DELAY, RESONANCE, delayed_record, noisy_resonance
 from independent.severities import drawn_parameters
 
+import rsea_ros as rsea
 from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.effects.catalogue import catalogue, effect_named
-from rsea_ros.identification.excitation import ExcitationSettings, chirp
+from rsea_ros.identification.excitation import ExcitationSettings, chirp, excitation
 from rsea_ros.model.prediction_errors import predict
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
@@ -220,3 +221,12 @@ def test_friction_that_lets_a_gear_rest_is_confirmed_and_no_larger_law_doubts_it
     assert [(c.name, c.status) for c in found.causes] == [("coulomb_friction", "confirmed")]
     assert found.alternatives == ()
     assert found.causes[0].parameters["torque"].value == pytest.approx(torque, rel=1e-3)
+
+
+def test_a_lag_beside_the_clocks_is_no_delay():
+    """In a logarithm a lag has a plateau at nothing: from the clock's bound the fit went there and stayed."""
+    command = excitation("chirp", ExcitationSettings(duration=60.0))
+    record = rsea.simulate(RIG.with_effect("ft_sensor_lag", time_constant=1.5e-3), command, RATE, seed=17)
+    (cause,) = diagnose([record], RIG, settings=only("ft_sensor_lag", "ft_delay", "base_compliance")).causes
+    low, high = cause.parameters["time_constant"].ci95
+    assert cause.name == "ft_sensor_lag" and low < 1.5e-3 < high

@@ -101,9 +101,12 @@ def sizes(
     return {p.name: with_model_uncertainty(e, rule, p.low) for p, e in known if e is not None}
 
 
-def size_of(effect: str, last: Evaluated, rule: SizeSettings) -> CauseParameter:
-    """Return the size of an effect in a model: its main parameter."""
-    return sizes(effect, parameters_of(last.solution, last.confidence), rule)[effect_named(effect).main.name]
+def needed_sizes(effect: str, last: Evaluated, rule: SizeSettings) -> list[CauseParameter]:
+    """Return what a cause must have a size of: its main parameter, and other scales that it needs."""
+    known = sizes(effect, parameters_of(last.solution, last.confidence), rule)
+    main, *others = effect_named(effect).parameters
+    scales = [p.name for p in others if p.logarithmic and not p.optional and p.unit != "1"]
+    return [known[name] for name in (main.name, *scales) if name in known]
 
 
 def is_known(size: CauseParameter, rule: SizeSettings) -> bool:
@@ -246,15 +249,15 @@ def with_sizes_known(
 ) -> dict[str, Named]:
     """Return the naming with no cause confirmed whose law the last model leaves open.
 
-    That is one of unknown size, one with a parameter at a bound, and every cause where the clock of a sensor
-    is at its bound: there the fit would go on, and another law may be what it lacks.
+    That is one of an unknown size or scale, one with a parameter at a bound, and every cause where the clock
+    of a sensor is at its bound: there the fit would go on, and another law may be what it lacks.
     """
     last, near = stages[-1], settings.acceptance.near_bound
     known = zip(last.solution.problem.unknowns, last.solution.theta, strict=True)
     is_clock_bound = any(u.is_clock and u.is_near_bound(float(t), near) for u, t in known)
 
     def is_open(name: str) -> bool:
-        is_sized = is_known(size_of(name, last, settings.sizes), settings.sizes)
+        is_sized = all(is_known(s, settings.sizes) for s in needed_sizes(name, last, settings.sizes))
         return is_clock_bound or not is_sized or is_held_by_bound(name, last, near)
 
     unclear = {s.added for s in stages[1:] if is_named(s, naming) and is_open(s.added)}

@@ -176,7 +176,7 @@ DRIFT = unknowns_of_effect(effect_named("ft_drift"), effect_named("ft_drift").ty
     ],
 )  # fmt: skip
 def test_a_cause_at_a_bound_leads_at_most(monkeypatch, effect, unknowns, values, sd, status):
-    monkeypatch.setattr(outcome, "size_of", lambda *_: CauseParameter(1.5, "1", (1.4, 1.6)))
+    monkeypatch.setattr(outcome, "needed_sizes", lambda *_: [CauseParameter(1.5, "1", (1.4, 1.6))])
     stages = [Stage(""), Stage(effect, unknowns, values, sd)]
     naming = outcome.with_sizes_known({effect: Named(None, 0.99, "confirmed", ())}, stages, DEFAULT)
     assert naming[effect].status == status
@@ -192,7 +192,7 @@ def test_a_cause_at_a_bound_leads_at_most(monkeypatch, effect, unknowns, values,
     ],
 )
 def test_a_cause_of_open_size_leads_at_most(monkeypatch, status, interval, after):
-    monkeypatch.setattr(outcome, "size_of", lambda *_: CauseParameter(1.5, "N m", interval))
+    monkeypatch.setattr(outcome, "needed_sizes", lambda *_: [CauseParameter(1.5, "N m", interval)])
     naming = {"coulomb_friction": Named(None, 0.99, status, ()), "backlash": Named(None, 0.1, None, ())}
     stages = [Stage(""), Stage("backlash"), Stage("coulomb_friction")]
     named = outcome.with_sizes_known(naming, stages, DEFAULT)
