@@ -172,7 +172,7 @@ def _inverse_case(record: Record, rig: Rig, rule: NoiseSettings) -> Case:
         drive=motion, t=dict.fromkeys(judged, motion.t), measured=judged,
         noise={n: _filtered_noise(known[n], rig.sensors.get(n, Sensor()), rule) for n in judged},
         mask=dict.fromkeys(judged, motion.counts), source=record.source,
-        floating=frozenset({"ft"} if "ft" in judged and rig.zero_unknown("deflection") else ()),
+        floating=frozenset([*judged][-1:] if len(motion.d) and rig.zero_unknown("deflection") else ()),
     )
 
 

@@ -311,7 +311,8 @@ class Identification:
         """Return by channel the RMS of the residual over the noise, of the channels that a verdict uses."""
         noise = self.noise_rms
         ratios = {n: v / noise[n] for n, v in self.residual_rms.items() if noise.get(n, 0.0) > 0.0}
-        return {n: r for n, r in ratios.items() if n in SENSED} or ratios
+        counts = (*SENSED, *(["motor_torque"] if self.rig.motion == "measured" else []))
+        return {n: r for n, r in ratios.items() if n in counts} or ratios
 
     @property
     def at_noise(self) -> bool:

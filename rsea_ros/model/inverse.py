@@ -16,6 +16,7 @@ Effects on a command are undone where only the commanded torque is known; a limi
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -128,7 +129,7 @@ def motion_from(record: Record, rig: Rig | None = None) -> Motion:
     finer = max(1, math.ceil(period / FINE))
     step = period / finer
     t = np.arange(position.t[0], position.t[-1] + 0.5 * step, step)
-    q, torque = np.interp(t, position.t, position.y), _torque_at(record, t)
+    q, torques = np.interp(t, position.t, position.y), _possible_torques(record, t, bool(beside))
     v, a = np.zeros(len(t)), np.zeros(len(t))
     counts, shown = np.zeros(len(t), bool), {n: np.zeros(len(t)) for n in beside}
     for begin, end in _sampled_spans(record, float(t[0]), float(t[-1])):
@@ -136,17 +137,51 @@ def motion_from(record: Record, rig: Rig | None = None) -> Motion:
         known = position.between(begin, end + 0.5 * step)
         q[part] = smooth(CubicSpline(known.t, known.y)(t[part]), step)
         v[part] = np.gradient(q[part], step)
-        a[part], torque[part] = np.gradient(v[part], step), smooth(torque[part], step)
+        a[part] = np.gradient(v[part], step)
+        for torque in torques:
+            torque[part] = smooth(torque[part], step)
         for n, values in shown.items():
             one = record[n].between(begin, end + 0.5 * step)
             values[part] = smooth(CubicSpline(one.t, one.y)(t[part]), step)
         counts[part] = (t[part] >= t[part][0] + SKIPPED_START) & (t[part] <= t[part][-1] - SKIPPED_START)
-    t, q, v, a, torque = (np.asarray(values[::finer], np.float64) for values in (t, q, v, a, torque))
+    t, q, v, a, *torques = (np.asarray(values[::finer], np.float64) for values in (t, q, v, a, *torques))
     rate = np.gradient(shown["deflection"], step) if "deflection" in shown else _nothing()
     ft, d = (np.asarray(shown.get(n, _nothing())[::finer], np.float64) for n in ("ft", "deflection"))
     commanded = "motor_torque" not in record
     counts = counts[::finer] & ~_reverses(v, period) if beside else counts[::finer]
+    torque = _likeliest(torques, [a, v, np.sign(v), np.ones(len(t)), ft if len(ft) else d], counts)
     return Motion(t, q, v, a, torque, counts, commanded, ft, d, np.asarray(rate[::finer]))
+
+
+def _possible_torques(record: Record, t: FloatArray, is_moved: bool) -> list[FloatArray]:
+    """Return the torque that acted at instants; of a moved output also as it is where nothing is held.
+
+    A loop far faster than its log holds no command from row to row: the measured torque counts at an instant
+    from its stamps back to a sample before, where the checks moved it towards the end of a hold.
+    """
+    torque = record["motor_torque"] if is_moved and "motor_torque" in record else None
+    held = [_torque_at(record, t)]
+    if torque is None:
+        return held
+    earlier = np.linspace(0.0, 1.0, _INSTANTS) / torque.rate
+    return held + [np.interp(t, torque.t - early, torque.y) for early in earlier]
+
+
+def _likeliest(
+    torques: Sequence[FloatArray], columns: Sequence[FloatArray], counts: BoolArray
+) -> FloatArray:
+    """Return the first of some torques, or another one that a motion explains far better, by regression."""
+    if len(torques) == 1 or np.count_nonzero(counts) < FEWEST:
+        return torques[0]
+    rows = np.column_stack(columns)[counts]
+    left = [y[counts] - rows @ np.linalg.lstsq(rows, y[counts], rcond=None)[0] for y in torques]
+    power = [float(np.mean(r**2)) for r in left]
+    best = int(np.argmin(power))
+    return torques[best if power[best] < _FAR_BETTER * power[0] else 0]
+
+
+_INSTANTS, _FAR_BETTER = 9, 0.5
+"""Tried within a sample. Of the power that is left: a torque whose hold is not the log's leaves far more."""
 
 
 def _reverses(v: FloatArray, period: float) -> BoolArray:
@@ -255,6 +290,8 @@ def _beside_spring(
     nothing = np.zeros(len(motion.t))
     d, rate = (motion.d, motion.d_rate) if len(motion.d) else (nothing, nothing)
     load = rig["spring.stiffness"] * d + rig["spring.damping"] * rate if len(motion.d) else motion.ft
+    if len(motion.d) and len(motion.ft) and rig.zero_unknown("deflection"):
+        load = load + float(np.mean((motion.ft - load)[motion.counts])) if motion.counts.any() else load
     damping = m.damping[0, 0] - rig["spring.damping"]
     linear = m.mass[0, 0] * motion.a + damping * motion.v + load
     torque, shown = _needed(machine, motion, linear, nothing, load, d, rate, period)

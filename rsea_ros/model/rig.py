@@ -417,6 +417,12 @@ def check_structure(rig: Rig) -> None:
     ):  # fmt: skip
         if value not in allowed:
             raise RigError(f"rig {rig.name}: {key} = {value!r}, expected one of {', '.join(allowed)}", key)
+    if rig.beside_spring == "housing" and rig["housing.inertia"]:
+        raise RigError(
+            f"rig {rig.name}: housing.inertia with beside_spring: housing, expected it as chassis.inertia: "
+            "that of the part beside the spring",
+            "housing.inertia",
+        )
     if rig.ft_end == "housing_end" and math.isinf(rig["proximal_spring.stiffness"]):
         raise RigError(
             f"rig {rig.name}: ft_end = housing_end without proximal_spring.stiffness, expected that of the "

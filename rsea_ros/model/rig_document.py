@@ -171,7 +171,7 @@ def tables() -> str:
         fields = [(name, field) for name, field in FIELDS.items() if name.startswith(f"{group}.")]
         parts.append(table(group, [*(_key(name, field) for name, field in fields), *SWITCHES.get(group, ())]))
     parts.append(table("sensors.CHANNEL", SENSOR))
-    channels = ", ".join(f"`{n}` {plain(u)}" for n, u in UNITS.items())
+    channels = ", ".join(f"`{n}` {plain(UNITS[n])}" for n in MEASURED)
     parts.append(f"Channels and their units: {channels}.\n")
     parts += [table("sensors.CHANNEL.clock", CLOCK), table("sensors.CHANNEL.filter", FILTER)]
     parts += [_loop_table(kind) for kind in LOOP_FIELDS]

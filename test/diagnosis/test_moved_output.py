@@ -17,10 +17,10 @@ from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.errors import IdentificationError, RigError
-from rsea_ros.model.rig import Quantity, Rig
+from rsea_ros.model.rig import Quantity, Rig, Sensor
 from rsea_ros.model.rig_document import rig_from_document
 from rsea_ros.model.rig_file import load_rig, rig_to_document
-from rsea_ros.records.record import Record
+from rsea_ros.records.record import Channel, Record
 
 TRUE = {"rotor.reflected_inertia": 0.21, "rotor.reflected_damping": 1.9, "spring.stiffness": 310.0,
         "spring.damping": 0.55}  # fmt: skip
@@ -106,6 +106,24 @@ def test_a_hardening_spring_is_named_with_its_size():
 
 def test_a_sound_joint_has_no_cause():
     assert diagnose([moved()], joint(), settings=SETTINGS).verdict == "nothing_wrong"
+
+
+def test_a_torque_that_no_hold_of_the_log_made_counts_where_the_motion_says():
+    """A loop that is far faster than its log holds nothing from row to row."""
+    run = moved()
+    torque = run["motor_torque"]
+    assert diagnose([run], joint(), settings=SETTINGS).verdict == "nothing_wrong"
+    early = run.with_channels(motor_torque=Channel(torque.t + 0.4 / RATE, torque.y))
+    assert diagnose([early], joint(), settings=SETTINGS).verdict == "nothing_wrong"
+
+
+def test_an_unknown_zero_of_the_deflection_is_no_offset_of_the_torque():
+    run = moved()
+    shifted = run.with_channels(deflection=Channel(run["deflection"].t, run["deflection"].y + 0.01))
+    tried = replace(SETTINGS, without=tuple(n for n in catalogue() if n != "asymmetric_friction"))
+    rig = replace(joint(), sensors={"deflection": Sensor(noise=2e-5, zero_unknown=True)})
+    assert diagnose([shifted], rig, settings=tried).verdict == "nothing_wrong"
+    assert rsea.identify(shifted, rig).parameters["spring.stiffness"].value == pytest.approx(310.0, rel=0.01)
 
 
 def test_a_moved_rig_comes_back_from_its_file_and_says_what_it_needs():

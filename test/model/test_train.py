@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from rolling import rotor_speed
 
+from rsea_ros.errors import RigError
 from rsea_ros.model import outputs
 from rsea_ros.model.equations import train_ratio
-from rsea_ros.model.rig import END_NAMES
+from rsea_ros.model.rig import END_NAMES, Quantity
 from rsea_ros.model.rig_document import rig_from_document
 from rsea_ros.model.rig_file import load_rig, rig_to_document
 from rsea_ros.model.train import TRAINS, rotor_turns, spin_inertia
@@ -35,6 +36,12 @@ def test_held_by_the_gear_the_rotor_turns_against_the_output(train):
     assert turns == pytest.approx(rotor_speed(train, 160.0, 1.0, 0.0), rel=1e-12)
     rig = replace(KNEE, train=train, beside_spring="housing")
     assert train_ratio(rig_from_document(rig_to_document(rig))) == turns
+
+
+def test_the_inertia_beside_the_spring_has_one_place():
+    quantities = {**KNEE.quantities, "housing.inertia": Quantity(0.3)}
+    with pytest.raises(RigError, match=r"expected it as chassis\.inertia"):
+        replace(KNEE, beside_spring="housing", quantities=quantities)
 
 
 @pytest.mark.parametrize(("housing", "hz"), [(0.004, 73.3), (0.0012, 152.0)])
