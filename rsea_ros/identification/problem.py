@@ -21,7 +21,8 @@ from rsea_ros.model.rig import Rig, Sensor
 from rsea_ros.model.sensor_filter import SensorFilter
 from rsea_ros.model.simulation import drive_of, simulate_drives
 from rsea_ros.model.step import OUTPUTS
-from rsea_ros.records.record import BoolArray, Channel, FloatArray, Record
+from rsea_ros.records.record import MEASURED, BoolArray, Channel, FloatArray, Record
+from rsea_ros.records.statistics import runs_of
 
 FEWEST = 64
 """Samples of a channel: fewer show no spectrum, so no noise to weigh them by."""
@@ -95,7 +96,7 @@ def case_from(
     """
     rig = rig.under(record.source)
     if is_inverse(rig):
-        return _inverse_case(record, rig, rule)
+        return _inverse_case(_without_long_faults(record, masked or {}), rig, rule)
     record = with_command(record, rig)
     channels = channels_that_tell(record, rig)
     beside = [n for n in record.channels if n not in OUTPUTS]
@@ -174,6 +175,21 @@ def _inverse_case(record: Record, rig: Rig, rule: NoiseSettings) -> Case:
         mask=dict.fromkeys(judged, motion.counts), source=record.source,
         floating=frozenset([*judged][-1:] if len(motion.d) and rig.zero_unknown("deflection") else ()),
     )
+
+
+def _without_long_faults(record: Record, masked: Mapping[str, BoolArray]) -> Record:
+    """Return a record without runs of faulty samples: what is bridged is no data, and a filter spreads it."""
+    kept = {}
+    for n, bad in ((n, bad) for n, bad in masked.items() if n in MEASURED and len(bad) == len(record[n])):
+        keep = np.ones(len(bad), bool)
+        for begin, end in runs_of(bad):
+            keep[begin:end] = end - begin < _LONG
+        kept[n] = Channel(record[n].t[keep], record[n].y[keep])
+    return record.with_channels(**{n: c for n, c in kept.items() if len(c) >= FEWEST})
+
+
+_LONG = 5
+"""Samples in a row."""
 
 
 def _filtered_noise(torque: Channel, sensor: Sensor, rule: NoiseSettings) -> float:

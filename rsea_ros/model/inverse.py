@@ -202,7 +202,11 @@ _FILTERED = ("position", "motor_torque", "deflection", "ft")
 def _sampled_spans(record: Record, start: float, stop: float) -> list[tuple[float, float]]:
     """Return begin and end (s) of the parts between gaps of the motion or its torque; short ones are gaps."""
     each = [Record({n: c}) for n, c in record.channels.items() if n in _FILTERED]
-    lost = sorted(gap for one in each for gap in gaps(one))
+    lost = [gap for one in each for gap in gaps(one)]
+    for first, last in ((one.start, one.stop) for one in each):  # a channel that begins late, or ends early
+        lost += [(start, first)] * (first > start + SKIPPED_START)
+        lost += [(last, stop)] * (last < stop - SKIPPED_START)
+    lost.sort()
     ends, begins = [*(a for a, _ in lost), stop], [start, *(b for _, b in lost)]
     parts = [(max(begins[: k + 1]), min(ends[k:])) for k in range(len(ends))]
     long = [(begin, end) for begin, end in parts if end - begin > 2.0 * SKIPPED_START]

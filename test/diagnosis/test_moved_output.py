@@ -117,6 +117,14 @@ def test_a_torque_that_no_hold_of_the_log_made_counts_where_the_motion_says():
     assert diagnose([early], joint(), settings=SETTINGS).verdict == "nothing_wrong"
 
 
+@pytest.mark.parametrize("name", ["motor_torque", "ft"])
+def test_what_ends_early_counts_no_longer(name):
+    run = moved()
+    ended = np.where(run[name].t < 14.0, run[name].y, np.nan)
+    cut = run.with_channels(**{name: Channel(run[name].t, ended)})
+    assert diagnose([cut], joint(), settings=SETTINGS).verdict == "nothing_wrong"
+
+
 def test_an_unknown_zero_of_the_deflection_is_no_offset_of_the_torque():
     run = moved()
     shifted = run.with_channels(deflection=Channel(run["deflection"].t, run["deflection"].y + 0.01))
