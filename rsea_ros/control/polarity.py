@@ -108,7 +108,8 @@ class Polarity:
 
     def watch(self, reading: Measurement, missed: int = 0) -> str:
         """Return a contradiction under torque, in words; empty without one. It sets doubted."""
-        self.doubted, lost = self._change.jump(reading, missed) != 0.0, missed + self._unheard
+        jump = self._change.jump(reading, missed)
+        self.doubted, lost = jump != 0.0, missed + self._unheard
         self._unheard = lost + 1 if self.doubted else 0
         heard = None if self.doubted else self._seen.hear(reading, self._sent[1], lost, keep=False)
         self._made = [self._seen.made[1], *self._made[:-1]]
@@ -121,7 +122,7 @@ class Polarity:
         if self.contradiction:
             return self.contradiction
         rest = None if heard is None else self._made[0] - sum(heard)
-        if words := self._change.take(reading, rest, missed):
+        if words := self._change.take(reading, rest, missed, jump):
             self._contradict(self._unless_frozen(words))
         if heard is None or self.contradiction:
             return self.contradiction

@@ -68,12 +68,12 @@ class SignChange:
         usual = JUMPED * since * math.sqrt(self._usual[0])
         return step if abs(step) > max(self._floor, JUMP * self._strongest, usual) else 0.0
 
-    def take(self, r: Measurement, rest: float | None, missed: int) -> str:
+    def take(self, r: Measurement, rest: float | None, missed: int, jump: float) -> str:
         """Take a reading in; return what has turned round or jumped, in words, empty if nothing surely has.
 
         rest: N m, the momentum that nothing explains, None where it is not known. missed: samples lost.
+        jump: of this reading, see there.
         """
-        jump = self.jump(r, missed)
         self._since += 1 + missed
         if not r.is_whole:
             return ""

@@ -2,8 +2,8 @@
 
 Each effect that a diagnosis tries is put into the model with which it ended, and grows until a channel's
 residual is `floor.only_noise` times its noise although every value of the fit answers it, to first order: up
-to there a search ends before it begins. What a fit answers wholly (an F/T gain where the stiffness is free)
-shows at no size. A change half as large again is found and named (docs/diagnosis.md has how often).
+to there a search ends before it begins. What a fit answers wholly (a motor constant, where only the angle is
+measured) shows at no size. A change half as large again is found and named (decision 342 has how often).
 """
 
 import math
@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import orth
 
 from rsea_ros.checks.faults import check
 from rsea_ros.diagnosis.diagnose import nominal_problem, searched_effects
@@ -43,35 +44,37 @@ def smallest_changes(diagnosis: Diagnosis, records: Sequence[Record]) -> tuple[S
         end = solve(problem, iterations=settings.fits.iterations, run=pools.run)
         names = sorted(problem.channels)
         rows = problem.by_row(lambda case, channel: names.index(channel)).astype(np.int64)
-        model = _Model(problem, end.theta, jacobian(problem, end.theta, end.residual, pools.run), rows)
+        matrix = jacobian(problem, end.theta, end.residual, pools.run)
+        answers = _answers(problem, matrix, by_clocks=False), _answers(problem, matrix, by_clocks=True)
+        model = _Model(problem, end.theta, rows, answers)
         effects = [e for e in searched_effects(problem, settings.without) if e.name not in problem.acting]
         limit = settings.floor.only_noise
         found = pools.fits.map(lambda effect: _smallest(effect, model, limit), effects)
         return tuple(change for change in found if change is not None)
 
 
+def _answers(problem: Problem, matrix: FloatArray, *, by_clocks: bool) -> FloatArray:
+    """Return b: values of a fit, clocks if by_clocks, leave change - b @ b.T @ change of its residuals."""
+    values = [k for k, u in enumerate(problem.unknowns) if by_clocks or not u.is_clock]
+    priors = np.diag([1.0 / problem.unknowns[k].doubt for k in values])
+    columns = np.vstack([matrix[:, values], priors])
+    size = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+    return np.asarray(orth(columns / size, rcond=1e-7))[: len(matrix)]
+
+
 @dataclass(frozen=True)
 class _Model:
-    """A fitted model. matrix: its derivatives, shape (m, n); channels: number of the channel of each row."""
+    """A fitted model. channels: number of that of each residual; answers: without clocks, with them."""
 
     problem: Problem
     theta: FloatArray
-    matrix: FloatArray
     channels: IntArray
+    answers: tuple[FloatArray, FloatArray]
 
     def shown(self, change: FloatArray, *, by_clocks: bool) -> float:
-        """Return the largest ratio of residual to noise in a channel, of a change that the values answer.
-
-        by_clocks: those of the sensors, too.
-        """
-        answers = [k for k, u in enumerate(self.problem.unknowns) if by_clocks or not u.is_clock]
-        doubts = np.array([self.problem.unknowns[k].doubt for k in answers])
-        matrix = np.vstack([self.matrix[:, answers], np.diag(1.0 / doubts)])
-        size = np.maximum(np.linalg.norm(matrix, axis=0), 1e-300)
-        normal = (matrix / size).T @ (matrix / size)
-        slope = (matrix / size)[: len(change)].T @ change
-        answer = np.linalg.lstsq(normal, slope, rcond=None)[0] / size
-        left = change - self.matrix[:, answers] @ answer
+        """Return the largest ratio of residual to noise in a channel, of a change that the values answer."""
+        answer = self.answers[by_clocks]
+        left = change - answer @ (answer.T @ change)
         power = np.bincount(self.channels, left**2) / np.maximum(np.bincount(self.channels), 1)
         return math.sqrt(1.0 + float(np.max(power))) if np.isfinite(power).all() else math.inf
 

@@ -255,11 +255,6 @@ def smooth(values: FloatArray, period: float) -> FloatArray:
     return np.asarray(filtfilt(*butter(4, min(CUT_OFF * 2.0 * period, 0.8)), values))
 
 
-def inverse_torque(rig: Rig, motion: Motion) -> FloatArray:
-    """Return the motor torque that a motion takes, N m, filtered like the motion, shape of motion.t."""
-    return torques_along(rig, motion)["motor_torque"]
-
-
 def torques_along(rig: Rig, motion: Motion) -> dict[str, FloatArray]:
     """Return the torques of `motion.judged` that a motion takes, N m, filtered like the motion."""
     read = ("position", "motor_torque", *(("ft", "deflection") if rig.motion == "measured" else ()))

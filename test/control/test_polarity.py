@@ -217,8 +217,9 @@ def test_an_ft_of_a_later_instant_is_no_jump():
     for k in range(1380):
         ahead = max(ahead - 1, dice.randrange(9) if dice.random() < 0.05 else 0)
         felt = replace(readings[k], ft=readings[k + ahead].ft, ft_age=-float(ahead))
-        assert not polarity._change.jump(felt, 0), k
-        polarity._change.take(felt, 0.0, 0)
+        jump = polarity._change.jump(felt, 0)
+        assert not jump, k
+        polarity._change.take(felt, 0.0, 0, jump)
 
 
 def test_a_gain_of_ft_that_changes_is_not_called_a_sign():
@@ -272,7 +273,7 @@ def test_a_blow_to_a_free_load_is_no_changed_sign():
     for k in range(300):
         ft, speed = (2.0 if k < 290 else -2.0), 0.01
         reading = Measurement(ft, speed, speed * k / RATE, ft + damping * speed)
-        assert change.take(reading, 0.0, 0) == ""
+        assert change.take(reading, 0.0, 0, change.jump(reading, 0)) == ""
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, 1e300, -1e300, 9e5])

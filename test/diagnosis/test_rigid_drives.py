@@ -15,7 +15,7 @@ from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.effects.signal_table import Port
 from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.identification.problem import case_from
-from rsea_ros.model.inverse import inverse_torque, motion_from
+from rsea_ros.model.inverse import motion_from, torques_along
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
 from rsea_ros.records.record import Channel, Record
@@ -53,7 +53,7 @@ def test_cogging_is_guessed_as_sharply_as_the_travel_resolves(seed):
     rig, record = cogging_record(seed)
     case = case_from(record, rig)
     travel = np.ptp(record["position"].y) * rig["gear.ratio"]
-    first = ripples(case, rig, {"motor_torque": inverse_torque(rig, case.drive)})[0]
+    first = ripples(case, rig, torques_along(rig, case.drive))[0]
     assert abs(first["cycles_per_revolution"] - 7.0) * travel < 0.25 * 2.0 * np.pi
     assert first["phase"] == pytest.approx(0.4, abs=0.8)
 
@@ -81,7 +81,8 @@ def test_no_effect_reads_the_torque_by_which_it_is_judged():
     other = replace(motion, torque=motion.torque[::-1])
     for effect in (e for e in catalogue().values() if e.port not in (Port.SPRING, Port.STRUCTURE)):
         loaded = rig.with_effect(effect.name)
-        assert np.array_equal(inverse_torque(loaded, motion), inverse_torque(loaded, other)), effect.name
+        taken, of_other = (torques_along(loaded, m)["motor_torque"] for m in (motion, other))
+        assert np.array_equal(taken, of_other), effect.name
 
 
 def test_the_torque_of_a_pendulum_that_turns_over_is_filtered_like_its_measurement():
@@ -91,6 +92,6 @@ def test_the_torque_of_a_pendulum_that_turns_over_is_filtered_like_its_measureme
     command = excitation("chirp", settings)
     channel = Channel(np.arange(len(command)) / 280.0, command)
     case = case_from(synthesize(rig, channel, noise=False), rig)
-    left = case.measured["motor_torque"] - inverse_torque(rig, case.drive)
+    left = case.measured["motor_torque"] - torques_along(rig, case.drive)["motor_torque"]
     keep = case.mask["motor_torque"]
     assert np.std(left[keep]) < 2e-3 * np.std(case.measured["motor_torque"][keep])

@@ -12,9 +12,9 @@ from rsea_ros.model.inverse import (
     _sampled_spans,
     _torque_at,
     acting_torque,
-    inverse_torque,
     motion_from,
     smooth,
+    torques_along,
 )
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
@@ -115,7 +115,7 @@ def motion(**changes):
 
 
 def taken(rig, **changes):
-    return inverse_torque(rig, motion(**changes))[200:-200]
+    return torques_along(rig, motion(**changes))["motor_torque"][200:-200]
 
 
 def test_the_torque_of_a_motion_is_that_of_the_equation_of_motion():
@@ -134,4 +134,4 @@ def test_the_torque_of_a_motion_is_that_of_the_equation_of_motion():
     assert taken(weak) == pytest.approx(expected / 0.8, abs=1e-6)
     assert taken(rig, commanded=True) == pytest.approx(expected, abs=1e-6)
     with pytest.raises(IdentificationError, match="moving parts, expected one"):
-        inverse_torque(load_rig("paper_moving_output"), motion())
+        torques_along(load_rig("paper_moving_output"), motion())

@@ -21,12 +21,12 @@ from test.nodes.warm import parent
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 TIMEOUT = 60.0
+"""Seconds for what normally takes one; a cold start compiles the simulation on a busy machine."""
 QUICK = {PROFILE: str(HERE / "quick_repairs.xml")}
 SOCKETS = "driver", "controller"
 """Nodes that have a profile of their own."""
 AGAIN = 15.0
 """s without an answer, which no service takes."""
-"""Seconds for what normally takes one; a cold start compiles the simulation on a busy machine."""
 
 
 class Process:

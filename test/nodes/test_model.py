@@ -76,7 +76,7 @@ class Heard:
 def heard(start, listener):
     """The node, running and heard."""
     heard = Heard(listener)
-    heard.process = start("quick_model", rig=RIG, reliable=True)
+    heard.process = start("model", rig=RIG, reliable=True)
     listener.until(lambda: heard.flags and listener.node.count_publishers("/rsea/torque_estimate"))
     return heard
 
