@@ -19,7 +19,7 @@ from rsea_ros.errors import IdentificationError
 from rsea_ros.model.extent import AS_SECONDS, check_extent, check_slow
 from rsea_ros.model.rig import Hold, Rig
 from rsea_ros.model.step import OUTPUTS
-from rsea_ros.records.holds import PERIODS, SHORTEST, lost_commands
+from rsea_ros.records.holds import lost_commands
 from rsea_ros.records.record import BoolArray, Channel, FloatArray, Record
 from rsea_ros.records.statistics import running_integral
 
@@ -115,41 +115,51 @@ def _has_moved(y: FloatArray) -> bool:
     return bool(y[0] != 0.0 and abs(y[0]) >= least)
 
 
-Restart = tuple[int, tuple[float, float]]
-"""Step of a drive before which it begins anew, and position (rad) and velocity (rad/s) there."""
+class SpringStart(NamedTuple):
+    """What a sensor of the spring shows at a start: F/T torque (N m) or deflection (rad), and its rate."""
+
+    channel: str
+    value: float
+    rate: float
 
 
-def gaps(record: Record) -> list[tuple[float, float]]:
-    """Return begin and end (s) of the gaps without a sample of any channel, or with lost commands, in order.
-
-    Stamps need not rise.
-    """
-    stamps = [c.t[np.isfinite(c.t)] for c in record.channels.values() if len(c) > 1]
-    if not stamps:
-        return []
-    t = np.sort(np.concatenate(stamps))
-    fastest = max(c.rate for c in record.channels.values() if len(c) > 1)
-    at = np.flatnonzero(np.diff(t) > max(SHORTEST, PERIODS / fastest if fastest > 0.0 else np.inf))
-    whole = [(float(t[k]), float(t[k + 1])) for k in at]
-    lost = lost_commands(record)
-    return sorted([*whole, *(p for p in lost if not any(a < p[1] and b > p[0] for a, b in whole))])
+Restart = tuple[int, tuple[float, float] | SpringStart]
+"""Step of a drive before which it begins anew; position (rad) and velocity (rad/s) there, or the spring."""
 
 
 def restarts(record: Record, start: float, step: float, *, from_rest: bool) -> tuple[Restart, ...]:
-    """Return where a drive begins anew. start: s, of its first step; from_rest: it began at angle zero."""
-    states = []
-    for _, end in gaps(record):
-        k = int(np.ceil((end - start) / step))
+    """Return where a drive begins anew, behind the commands that were lost, with what is measured there.
+
+    start: s, of its first step; from_rest: it began at angle zero.
+    """
+    states: list[Restart] = []
+    for end in (end - ON_GRID * step for _, end in lost_commands(record)):
+        moves = next((n for n in ("velocity", "position", "deflection", "ft") if _from(record, n, end)), "")
+        t, y = _from(record, moves, end) or (np.full(2, end), np.zeros(2))
+        rate = float(np.diff(y[:2])[0] / np.diff(t[:2])[0]) if moves else 0.0
+        middle = 0.5 * float(t[0] + t[1])  # where the slope is the rate
+        k = math.ceil(((end if moves == "velocity" else middle) - start) / step)
+        if moves in ("deflection", "ft"):
+            states.append((k, SpringStart(moves, 0.5 * float(y[0] + y[1]), rate)))
+            continue
         position, velocity = state_at(record, end, start + k * step)
         states.append((k, (position - state_at(record, start, start)[0] * from_rest, velocity)))
     return tuple(states)
 
 
+_SETTLING = 0.5
+"""Of a record, that the time behind all gaps may take, which nothing uses."""
+
+
 def outside_gaps(record: Record, t: FloatArray, settling: float) -> BoolArray:
-    """Return which times lie in no gap and not within `settling` (s) behind one, shape (n,)."""
-    outside = np.ones(len(t), bool)
-    for begin, end in gaps(record):
-        outside &= (t <= begin) | (t >= end + settling)
+    """Return which times lie in no gap and not within `settling` (s) behind one, shape (n,).
+
+    Less than `settling` where there are so many that most of the record would be left out.
+    """
+    outside, gaps = np.ones(len(t), bool), lost_commands(record)
+    recorded = record.stop - record.start - sum(end - begin for begin, end in gaps) if gaps else 0.0
+    for begin, end in gaps:
+        outside &= (t <= begin) | (t >= end + min(settling, _SETTLING * recorded / len(gaps)))
     return outside
 
 
@@ -207,14 +217,6 @@ MOST_STEPS = 5e7
 
 LONGEST_OF_JOINTS = 1e-3
 """s, where targets at tens of Hz command a position loop, whose firmware samples about as often."""
-
-
-class SpringStart(NamedTuple):
-    """What a sensor of the spring shows at the start: F/T torque (N m) or deflection (rad), and its rate."""
-
-    channel: str
-    value: float
-    rate: float
 
 
 @dataclass(frozen=True)

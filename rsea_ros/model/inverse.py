@@ -24,13 +24,12 @@ import numpy as np
 from rsea_ros.compiler import njit
 from rsea_ros.effects import signal_table as st
 from rsea_ros.errors import IdentificationError
-from rsea_ros.model.drive import gaps
 from rsea_ros.model.equations import Mechanics, mechanics, with_structure
 from rsea_ros.model.extent import SKIPPED_START, check_extent, check_slow
 from rsea_ros.model.rig import END_NAMES, Rig, check_unfiltered
 from rsea_ros.model.simulation import Machine, build
 from rsea_ros.model.step import Calls, call_port
-from rsea_ros.records.holds import AT_EDGE
+from rsea_ros.records.holds import AT_EDGE, PERIODS
 from rsea_ros.records.record import BoolArray, Channel, FloatArray, Record
 
 CUT_OFF = 20.0
@@ -197,13 +196,17 @@ def _reverses(v: FloatArray, period: float) -> BoolArray:
 _NEARLY_AT_REST = 0.02
 """Of the speed's RMS."""
 _FILTERED = ("position", "motor_torque", "deflection", "ft")
+_BRIDGED = 0.1
+"""s. A shorter silence of a motion is a line, and counts."""
 
 
 def _sampled_spans(record: Record, start: float, stop: float) -> list[tuple[float, float]]:
     """Return begin and end (s) of the parts between gaps of the motion or its torque; short ones are gaps."""
-    each = [Record({n: c}) for n, c in record.channels.items() if n in _FILTERED]
-    lost = [gap for one in each for gap in gaps(one)]
-    for first, last in ((one.start, one.stop) for one in each):  # a channel that begins late, or ends early
+    lost: list[tuple[float, float]] = []
+    for t in (c.t for n, c in record.channels.items() if n in _FILTERED):
+        first, last = float(t[0]), float(t[-1])  # a channel that begins late, or ends early
+        silent = np.flatnonzero(np.diff(t) > max(_BRIDGED, PERIODS * float(np.median(np.diff(t)))))
+        lost += zip(t[silent].tolist(), t[silent + 1].tolist(), strict=True)
         lost += [(start, first)] * (first > start + SKIPPED_START)
         lost += [(last, stop)] * (last < stop - SKIPPED_START)
     lost.sort()

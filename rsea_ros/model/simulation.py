@@ -143,12 +143,19 @@ class Machine:
     early: float
     start_maps: dict[str, FloatArray]
 
-    def begin(self, initial: tuple[float, float] = (0.0, 0.0), spring: SpringStart | None = None) -> None:
+    def begin(
+        self, initial: tuple[float, float] | SpringStart = (0.0, 0.0), spring: SpringStart | None = None
+    ) -> None:
         """Set the state to an output angle (rad) and velocity (rad/s), at time zero, with no history.
 
-        spring: what its sensor shows at that time, where it is known.
+        spring: what its sensor shows at that time, where it is known; as `initial`, all that is known.
         """
-        if spring is None:
+        if isinstance(initial, SpringStart):
+            rows = self.linear.outputs
+            shown = start_map(self.mechanics, rows[OUTPUT_ROWS.index(initial.channel)])
+            self.x[:] = shown @ np.array([initial.value, initial.rate])
+            initial = float(rows[0] @ self.x), float(rows[1] @ self.x)
+        elif spring is None:
             self.x[:] = self._start_map() @ np.array(initial)
         else:
             self.x[:] = self._start_map(spring.channel) @ np.array([*initial, spring.value, spring.rate])

@@ -24,9 +24,10 @@ from rsea_ros.records.record import (
     IntArray,
     Record,
 )
+from rsea_ros.records.stamp_order import GAP, NO_MULTIPLE, local_period
 
-SHORTEST, PERIODS = 0.1, 10.0
-"""s, and sample periods of the fastest channel: a shorter gap leaves the last command a good guess."""
+PERIODS = 10.0
+"""Of a command: what a host that polls as it can lets pass, and for how long a motor torque speaks."""
 
 AT_EDGE = 0.01
 """Of a command's period: stamps so near are one, rounded to nanoseconds in one of two channels."""
@@ -35,22 +36,45 @@ _LOST = 3.0
 
 
 def lost_commands(record: Record) -> list[tuple[float, float]]:
-    """Return begin and end (s) of the pauses of the commands in which the motor did not hold the last one."""
+    """Return begin and end (s) of the steps between commands in which others acted, in order.
+
+    Where a sensor went on, the last command held, unless the motor torque shows another one. Where none did,
+    the recorder lost rows, unless the motor torque behind a few periods shows that nothing was sent in them.
+    """
+    command = next((record[n] for n in COMMANDS if n in record), None)
+    if command is None or len(command) < 3 or not np.all(np.diff(command.t) > 0.0):
+        return []
+    step, period = np.diff(command.t), local_period(command.t)
+    few = (step > GAP * period) & (step <= PERIODS * period)
+    off_a_tick = np.abs(step / period - np.rint(step / period))[few]
+    on_ticks = few.any() and float(np.median(off_a_tick)) < NO_MULTIPLE
+    long = np.flatnonzero(step > period * (GAP if on_ticks else PERIODS))
+    held, lost = _torque_held(record, long), []
+    sensors = [record[n].t for n in MEASURED if n in record]
+    for k in long.tolist():
+        begin, end = float(command.t[k]), float(command.t[k + 1])
+        recorded = any(_goes_on(t, begin, end, GAP * period[k]) for t in sensors)
+        short = step[k] <= PERIODS * period[k]
+        if held.get(k) is False or not (recorded or (short and held.get(k))):
+            lost.append((begin, end))
+    return lost
+
+
+def _torque_held(record: Record, long: IntArray) -> dict[int, bool]:
+    """Return of some steps whether the motor torque in them is that of the last command, where it tells."""
     command, torque = record.channels.get("command"), record.channels.get("motor_torque")
-    if command is None or torque is None or len(command) < 3 or not np.all(np.diff(command.t) > 0.0):
-        return []
-    pauses = np.flatnonzero(np.diff(command.t) > max(SHORTEST, PERIODS / command.rate))
-    if not len(pauses) or not np.isfinite(torque.y).any():
-        return []
+    if command is None or torque is None or not len(long) or not np.isfinite(torque.y).any():
+        return {}
     hold = _shown_commands(command, torque)
     off = np.square(torque.y - command.y[hold])
-    known, paused = np.isfinite(off), np.isin(hold, pauses)
+    known, paused = np.isfinite(off), np.isin(hold, long)
     if not (known & ~paused).any():
-        return []
-    usual = float(np.mean(off[known & ~paused]))
-    within = [off[known & (hold == k)] for k in pauses]
-    lost = [k for k, o in zip(pauses, within, strict=True) if len(o) and np.mean(o) > _LOST**2 * usual]
-    return [(float(command.t[k]), float(command.t[k + 1])) for k in lost]
+        return {}
+    most = _LOST**2 * float(np.mean(off[known & ~paused]))
+    differ = most < float(np.mean(np.square(np.diff(command.y))))  # else one command is as good as the next
+    within = {k: off[known & (hold == k)] for k in long.tolist()}
+    far = {k: bool(np.mean(o) > most) for k, o in within.items() if len(o)}
+    return {k: not is_far for k, is_far in far.items() if is_far or differ}
 
 
 def _shown_commands(command: Channel, torque: Channel) -> IntArray:
@@ -131,10 +155,13 @@ def paused_steps(record: Record, name: str) -> BoolArray:
     return pauses
 
 
-def _goes_on(t: FloatArray, start: float, stop: float) -> bool:
-    """Return whether stamps lie all over a span, s."""
-    inside = t[(t > start) & (t < stop)]
-    return float(np.max(np.diff(inside, prepend=start, append=stop))) <= _THROUGHOUT * (stop - start)
+def _goes_on(t: FloatArray, start: float, stop: float, near: float = 0.0) -> bool:
+    """Return whether stamps lie all about a span, s. near: so close to each other is close enough, s."""
+    around = t[max(0, np.searchsorted(t, start, "right") - 1) : np.searchsorted(t, stop) + 1]
+    ends = [[] if len(around) and side * (around[k] - at) >= 0.0 else [at]
+            for k, at, side in ((0, start, -1.0), (-1, stop, 1.0))]  # fmt: skip
+    longest = float(np.max(np.diff(np.concatenate([ends[0], around, ends[1]]))))
+    return longest <= max(near, _THROUGHOUT * (stop - start))
 
 
 def _hold_commands(record: Record, name: str, held: BoolArray) -> Channel:

@@ -157,7 +157,7 @@ _FOLLOW = 0.2
 """How far the steady clock behind the stamps goes towards each of them."""
 _OFTEN = 0.02
 """Share of the steps: where fewer are long, they are accidents and no habit of the host."""
-_NO_MULTIPLE, _TIMES = 0.15, 3.0
+NO_MULTIPLE, _TIMES = 0.15, 3.0
 """In periods: so far off a whole number, and so many times farther than steps of one period are off, the
 typical long step is no multiple."""
 
@@ -209,7 +209,7 @@ def polls_unevenly(step: FloatArray, period: float | FloatArray) -> bool:
         return False
     off = np.abs(step / period - np.rint(step / period))
     usual = 0.0 if long.all() else float(np.median(off[~long]))
-    return float(np.median(off[long])) > max(_NO_MULTIPLE, _TIMES * usual)
+    return float(np.median(off[long])) > max(NO_MULTIPLE, _TIMES * usual)
 
 
 def _ticks(step: FloatArray, period: FloatArray) -> FloatArray:

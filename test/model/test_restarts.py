@@ -11,8 +11,8 @@ import rsea_ros as rsea
 from rsea_ros.checks.faults import check
 from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.model import inverse
-from rsea_ros.model.drive import gaps
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.records.holds import lost_commands
 from rsea_ros.records.record import Channel, Record
 
 RIG = load_rig("paper_high_impedance")
@@ -36,11 +36,39 @@ def test_predict_and_identify_leave_only_noise_beside_two_gaps():
     assert fit.rig["spring.stiffness"] == pytest.approx(1530.456, abs=1.0)
 
 
+ROWS = [(1, 12, "position"), (4, 12, "position"), (1, 60, "position"), (4, 12, "ft"), (2, 30, "position")]
+
+
+@pytest.mark.parametrize(("rows", "times", "sensor"), ROWS)
+def test_rows_that_a_recorder_lost_are_no_misfit(rows, times, sensor):
+    """One row in a hundred lost: 8 times the noise, for the command before it was held."""
+    at = np.random.default_rng(6).choice(np.arange(300, 3900), times, replace=False) / 280.0
+    left = without(*((a - 1e-4, a + (rows - 0.5) / 280.0) for a in at))
+    record = Record({n: left[n] for n in ("command", sensor)})
+    fit = rsea.identify(record, RIG)
+    assert max(fit.result.times_noise.values()) < 1.25
+    assert fit.rig["rotor.reflected_inertia"] == pytest.approx(0.953, rel=0.01)
+
+
+def test_cycles_that_were_never_sent_hold_the_command_before_them():
+    """The rows are missing of a machine that held: its motor torque shows it, and nothing begins anew."""
+    command = SOUND["command"].y.copy()
+    lost = np.arange(400, 4000, 37)
+    command[lost] = command[lost - 1]
+    held, keep = rsea.simulate(RIG, command, rate=280.0, seed=1), np.ones(4200, bool)
+    keep[lost] = False
+    record = Record({n: Channel(c.t[keep], c.y[keep]) for n, c in held.channels.items()})
+    assert lost_commands(record) == []
+    assert max(rsea.identify(record, RIG).result.times_noise.values()) < 1.1
+    blind = Record({n: c for n, c in record.channels.items() if n != "motor_torque"})
+    assert len(lost_commands(blind)) == len(lost)
+
+
 def test_commands_that_pause_alone_are_held_where_no_motor_torque_shows_others():
     paused = without((5.0, 8.0), names=("command",))
     unknown = Record({n: c for n, c in paused.channels.items() if n != "motor_torque"})
-    assert gaps(unknown) == []
-    (only,) = gaps(without((5.0, 8.0)))
+    assert lost_commands(unknown) == []
+    (only,) = lost_commands(without((5.0, 8.0)))
     assert only == pytest.approx((5.0, 8.0), abs=0.01)
 
 
@@ -53,7 +81,7 @@ def only_commands_without(record, begin, end):
 def test_commands_that_were_lost_are_a_gap_where_the_motor_torque_shows_others():
     """142 times the noise, which nothing of the catalogue explained: the last command was held for 0.7 s."""
     record = only_commands_without(SOUND, 5.0, 5.7)
-    (only,) = gaps(record)
+    (only,) = lost_commands(record)
     assert only == pytest.approx((5.0, 5.7), abs=0.01)
     fit = rsea.identify(record, RIG)
     assert max(fit.result.times_noise.values()) < 1.15
@@ -66,13 +94,13 @@ def test_commands_that_are_published_on_change_are_held():
     command = SOUND["command"].y.copy()
     command[1400:1600] = command[1400]
     held = rsea.simulate(RIG, command, rate=280.0, seed=1)
-    assert gaps(only_commands_without(held, 1400.5 / 280.0, 1600.0 / 280.0)) == []
+    assert lost_commands(only_commands_without(held, 1400.5 / 280.0, 1600.0 / 280.0)) == []
 
 
 def test_a_motor_torque_that_is_never_a_number_shows_nothing_of_a_pause():
     paused = only_commands_without(SOUND, 5.0, 5.7)
     dead = Channel(paused["motor_torque"].t, np.full(len(paused["motor_torque"]), np.nan))
-    assert gaps(paused.with_channels(motor_torque=dead)) == []
+    assert lost_commands(paused.with_channels(motor_torque=dead)) == []
 
 
 def test_commands_that_are_no_numbers_are_lost_ones():
@@ -82,7 +110,7 @@ def test_commands_that_are_no_numbers_are_lost_ones():
     checked = check(SOUND.with_channels(command=Channel(SOUND["command"].t, command)), RIG)
     assert ("nan", "command") in {(f.kind, f.channel) for f in checked.faults}
     assert len(checked.record["command"]) == len(checked.masked["command"]) == 4000
-    assert len(gaps(checked.record)) == 1
+    assert len(lost_commands(checked.record)) == 1
 
 
 @functools.cache
