@@ -42,7 +42,7 @@ class DrivenJoint:
     """
 
     def __init__(
-        self, node: Node, jobs: Jobs, part: str, values: Mapping[str, Any], device: Device,
+        self, node: Node, jobs: Jobs, part: str, values: dict[str, Any], device: Device,
         offers: list[Offer],
     ) -> None:  # fmt: skip
         self._node, self._jobs, self.part, self._values = node, jobs, part, values
@@ -81,6 +81,22 @@ class DrivenJoint:
             every_record=values["ft_all"], part=self.part, deflects=self.guarded.measures_deflection(),
         )  # fmt: skip
         self.drive = DriverCycle(self.guarded, self.topics, anchor, values["rate"])
+
+    def change(self, values: Mapping[str, Any]) -> None:
+        """Take new values of limits; before the device is open they count from configure on.
+
+        Raises ParameterError for those that cannot be.
+        """
+        before = {name: self._values[name] for name in values}
+        self._values |= values
+        try:
+            if self.drive is None:
+                limits_of(self._values)
+            else:
+                self.guarded.limit([name.removesuffix("_limit") for name in values])
+        except RseaError:
+            self._values |= before
+            raise
 
     def runs_in(self, cycle: Cycle) -> None:
         """Note the cycle, whose times are reported with this joint's health."""

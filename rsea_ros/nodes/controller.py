@@ -19,12 +19,15 @@ from msg_adapters.topic_map import TYPES
 from rsea_ros.control.controller import Measurement
 from rsea_ros.control.grid import Grid
 from rsea_ros.control.polarity import Polarity
+from rsea_ros.errors import ParameterError
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.nodes import _control
 from rsea_ros.nodes._anchor import Anchor
 from rsea_ros.nodes._control import TABLE, ControllerLimits, controller_of, design_of, summary, with_limits
 from rsea_ros.nodes._cycle import SECOND
 from rsea_ros.nodes._health import ERROR, OK, WARN, Health, NodeHealth
 from rsea_ros.nodes._link import Measurements, link_of, link_values, link_words
+from rsea_ros.nodes._parameters import let_change
 from rsea_ros.nodes._qos import COMMAND, await_arrival
 from rsea_ros.nodes._realtime import keep_time
 from rsea_ros.nodes._run import run_node
@@ -45,7 +48,7 @@ class ControllerNode:
     """
 
     def __init__(self, node: Node, values: dict[str, Any]) -> None:
-        values = with_limits(values)
+        self._stated, values = values, with_limits(values)
         self._node, self._values = node, values
         self._design = design_of(values)
         self._link = link_of(values, self._design)
@@ -59,6 +62,7 @@ class ControllerNode:
         self._anchor, self._grid = Anchor(), Grid(self._period)
         self._limits = ControllerLimits(values)
         self._polarity = Polarity(load_rig(values["rig"]), values["rate"], values["torque_limit"])
+        self._reading = Measurement(0.0, 0.0, 0.0)
         self._last, self._heard, self._watched, self._lag, self._torque = 0, 0, 0, 0.0, 0.0
         self._fault, self._told_fault, self._release = "", "", (0, 0.0)
         self._wished = self._held = False
@@ -75,6 +79,31 @@ class ControllerNode:
             node.get_logger().info(line)
         self._waiter = Waiter(node, self._inputs.subscriptions, self._work, WATCH)
         keep_time(node, self._waiter, values)
+        let_change(node, TABLE, self._change)
+
+    def _change(self, new: dict[str, Any]) -> None:
+        """Take new limits, raised ones only without torque, and gains, which begin softly.
+
+        Raises ParameterError for gains that are unstable with a load, or a limit raised under torque.
+        """
+        stated = {**self._stated, **new}
+        derived = with_limits(stated)
+        values = {**self._values, **{name: derived[name] for name in new}}
+        design, controller, link = self._design, self._controller, self._link
+        if not new.keys().isdisjoint(_control.GAINS):
+            design = design_of(values)
+            share = link.share if link.encoder is None else link_of(values, design).share
+            link, controller = link._replace(share=share), controller_of(values, design, share)
+        with self._lock:
+            raised = [name for name in _control.LIMITS if values[name] > self._values[name]]
+            if raised and self._wished and not self._fault:
+                raise ParameterError(f"{raised[0]} is raised under torque, expected clear_fault first")
+            if controller is not self._controller:
+                controller.start(self._reading, self._desired.torque)
+            controller.limit(_control.torque_limits(values))
+            self._limits.limit(values)
+            self._stated, self._values = stated, values
+            self._design, self._controller, self._link = design, controller, link
 
     def _work(self) -> None:
         """Command for each measurement that came, and see to their absence."""
@@ -116,7 +145,8 @@ class ControllerNode:
         desired = self._desired.torque if self._polarity.proven else reading.ft
         if fault := falsified or self._polarity.contradiction or self._limits.fault(reading.ft, desired):
             return self._latch(fault)
-        self._torque = torque
+        most = self._values["torque_limit"]  # pulses, too, keep one that was lowered
+        self._torque, self._reading = min(max(torque, -most), most), reading
         self._publish(self._grid.next)
         self._last = stamp
         self._steps, self._missed = self._steps + 1, self._missed + missed
