@@ -12,9 +12,8 @@ from msg_adapters import ros
 from msg_adapters.cdr import VALUES, RawWriter
 from msg_adapters.topic_map import FLOATS, JOINT_STATE, TYPES
 from rsea_ros.hardware.device import State
-from rsea_ros.nodes._anchor import Anchor
 from rsea_ros.nodes._commands import HORIZON, CommandQueue
-from rsea_ros.nodes._cycle import Cycle
+from rsea_ros.nodes._cycle import Anchor, Cycle
 from rsea_ros.nodes._health import OK, WARN, NodeHealth
 from rsea_ros.nodes._mailbox import Mailbox, MessageFields
 from rsea_ros.nodes._parameters import JOINT, NodeParameter

@@ -4,7 +4,7 @@ import math
 import threading
 from typing import NamedTuple
 
-from rsea_ros.nodes._anchor import SECOND
+from rsea_ros.nodes._cycle import SECOND
 from rsea_ros.records.record import NONSENSE, is_measured
 
 MILLISECOND = SECOND // 1000

@@ -10,8 +10,8 @@ from typing import Protocol
 from rsea_ros.hardware.device import State
 from rsea_ros.hardware.guarded import GuardedDevice, Shared, cycle
 from rsea_ros.hardware.interlock import DeviceFault
-from rsea_ros.nodes._anchor import SECOND, Anchor
 from rsea_ros.nodes._commands import CommandQueue
+from rsea_ros.nodes._cycle import SECOND, Anchor
 from rsea_ros.processes import ENDING
 
 CLOCK_STEP, RESTARTED = "clock_step", "restarted"

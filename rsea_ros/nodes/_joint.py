@@ -16,9 +16,8 @@ from rsea_ros.hardware.guarded import GuardedDevice
 from rsea_ros.hardware.interlock import DeviceFault, event
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.rig_limits import check_travel
-from rsea_ros.nodes._anchor import Anchor
 from rsea_ros.nodes._bench_topics import BenchTopics
-from rsea_ros.nodes._cycle import Cycle
+from rsea_ros.nodes._cycle import Anchor, Cycle
 from rsea_ros.nodes._devices import limits_of, spring_of, witnesses_of
 from rsea_ros.nodes._drive import DriverCycle
 from rsea_ros.nodes._health import ERROR, OK, WARN, Health, NodeHealth

@@ -96,14 +96,19 @@ def declare(
     node: Node,
     table: Sequence[NodeParameter],
     more: Callable[[Mapping[str, Any]], Sequence[NodeParameter]] = lambda given: (),
+    foreign: Collection[str] = (),
 ) -> dict[str, Any]:
     """Declare a table on a node and return the values. more: further parameters, from the given ones.
 
+    foreign: names that are given to all nodes of the process, and are none of this one's.
     The node was made with `automatically_declare_parameters_from_overrides`, so it has the given values.
     Raises ParameterError for a wrong value, and for a name that is not in the table.
     """
     given = {name: parameter.value for name, parameter in node.get_parameters_by_prefix("").items()}
     table = [*table, *more(given)]
+    for name in given.keys() & (set(foreign) - {p.name for p in table}):
+        node.undeclare_parameter(name)
+        del given[name]
     _refuse_unknown(given, table)
     values = {p.name: p.check(given.get(p.name, p.default)) for p in table}
     for parameter in table:

@@ -74,6 +74,7 @@ def keep_time(node: Node, worker: Worker, values: Mapping[str, Any]) -> None:
     sys.setswitchinterval(SWITCH_INTERVAL)  # Python's own, 5 ms, is longer than a cycle, and so is
     gc.collect()  # a garbage collection over everything that a node has loaded
     gc.freeze()
+    ctypes.CDLL(None).malloc_trim(0)  # what imports and designs have left
     worker.start()
     processor = values["cpu_affinity"]
     if processor in PROCESSORS:

@@ -22,15 +22,14 @@ from rsea_ros.control.polarity import Polarity
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.nodes import _control
-from rsea_ros.nodes._anchor import Anchor
 from rsea_ros.nodes._control import TABLE, ControllerLimits, controller_of, design_of, summary, with_limits
-from rsea_ros.nodes._cycle import SECOND
+from rsea_ros.nodes._cycle import SECOND, Anchor
 from rsea_ros.nodes._health import ERROR, OK, WARN, Health, NodeHealth
 from rsea_ros.nodes._link import Measurements, link_of, link_values, link_words
 from rsea_ros.nodes._parameters import let_change
 from rsea_ros.nodes._qos import COMMAND, await_arrival
 from rsea_ros.nodes._realtime import keep_time
-from rsea_ros.nodes._run import run_node
+from rsea_ros.nodes._run import Component
 from rsea_ros.nodes._waiter import Waiter
 
 WATCH = 0.005
@@ -52,7 +51,7 @@ class ControllerNode:
         self._node, self._values = node, values
         self._design = design_of(values)
         self._link = link_of(values, self._design)
-        self._controller = controller_of(values, self._design, self._link.share)
+        self._controller = self._newest = controller_of(values, self._design, self._link.share)
         self._period = SECOND / values["rate"]
         self._inputs = Measurements(
             node, values["axis"], self._period, values["joint"],
@@ -62,7 +61,6 @@ class ControllerNode:
         self._anchor, self._grid = Anchor(), Grid(self._period)
         self._limits = ControllerLimits(values)
         self._polarity = Polarity(load_rig(values["rig"]), values["rate"], values["torque_limit"])
-        self._reading = Measurement(0.0, 0.0, 0.0)
         self._last, self._heard, self._watched, self._lag, self._torque = 0, 0, 0, 0.0, 0.0
         self._fault, self._told_fault, self._release = "", "", (0, 0.0)
         self._wished = self._held = False
@@ -89,21 +87,20 @@ class ControllerNode:
         stated = {**self._stated, **new}
         derived = with_limits(stated)
         values = {**self._values, **{name: derived[name] for name in new}}
-        design, controller, link = self._design, self._controller, self._link
+        design, newest, link = self._design, self._newest, self._link
         if not new.keys().isdisjoint(_control.GAINS):
             design = design_of(values)
             share = link.share if link.encoder is None else link_of(values, design).share
-            link, controller = link._replace(share=share), controller_of(values, design, share)
+            link, newest = link._replace(share=share), controller_of(values, design, share)
         with self._lock:
             raised = [name for name in _control.LIMITS if values[name] > self._values[name]]
             if raised and self._wished and not self._fault:
                 raise ParameterError(f"{raised[0]} is raised under torque, expected clear_fault first")
-            if controller is not self._controller:
-                controller.start(self._reading, self._desired.torque)
-            controller.limit(_control.torque_limits(values))
+            for controller in (self._controller, newest):
+                controller.limit(_control.torque_limits(values))
             self._limits.limit(values)
             self._stated, self._values = stated, values
-            self._design, self._controller, self._link = design, controller, link
+            self._design, self._newest, self._link = design, newest, link
 
     def _work(self) -> None:
         """Command for each measurement that came, and see to their absence."""
@@ -146,7 +143,7 @@ class ControllerNode:
         if fault := falsified or self._polarity.contradiction or self._limits.fault(reading.ft, desired):
             return self._latch(fault)
         most = self._values["torque_limit"]  # pulses, too, keep one that was lowered
-        self._torque, self._reading = min(max(torque, -most), most), reading
+        self._torque = min(max(torque, -most), most)
         self._publish(self._grid.next)
         self._last = stamp
         self._steps, self._missed = self._steps + 1, self._missed + missed
@@ -167,15 +164,13 @@ class ControllerNode:
             torque = self._polarity.probe(reading, desired, missed, acts=acts)
             if torque is not None:
                 return torque
-            self._controller.start(reading, self._desired.torque)
-            missed = 0
+            missed = self._start(reading)
         elif self._polarity.watch(reading, missed):
             return 0.0
         elif self._polarity.doubted:
             reading = replace(reading, ft=math.nan)  # a lost sample
-        elif self._held != before:
-            self._controller.start(reading, self._desired.torque)
-            missed = 0
+        elif self._held != before or self._newest is not self._controller:
+            missed = self._start(reading)
         torque = self._controller.step(
             reading,
             self._desired.torque,
@@ -186,6 +181,12 @@ class ControllerNode:
         )
         self._polarity.sent(torque)
         return torque
+
+    def _start(self, reading: Measurement) -> int:
+        """Begin softly, with the newest gains; return how many samples were missed then."""
+        self._controller = self._newest
+        self._controller.start(reading, self._desired.torque)
+        return 0
 
     def _take_desired(self) -> float:
         """Take the desired torque nearest to this sample; return by how many samples it is for later.
@@ -302,10 +303,8 @@ class ControllerNode:
             yield f"without the link's motion: {encoder.trouble or 'deflection was lost for a moment'}"
 
 
-def main() -> int:
-    """Run the node."""
-    return run_node("controller", TABLE, ControllerNode, waits_for_nobody=True)
-
+NODE = Component("controller", TABLE, ControllerNode, waits_for_nobody=True)
+main = NODE.run
 
 if __name__ == "__main__":
     sys.exit(main())

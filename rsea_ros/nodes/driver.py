@@ -20,9 +20,8 @@ from rsea_ros.documents.wording import printable
 from rsea_ros.errors import DeviceError, ParameterError, RseaError
 from rsea_ros.hardware.limits import CHANGEABLE
 from rsea_ros.hardware.outside import EXTRA_PATH, options_of
-from rsea_ros.nodes._anchor import Anchor
 from rsea_ros.nodes._bench_topics import COMMAND_TYPE, NAMES, SPRING_FRAME, Combined
-from rsea_ros.nodes._cycle import Cycle
+from rsea_ros.nodes._cycle import Anchor, Cycle
 from rsea_ros.nodes._device_parameters import ENCODER, LIMITS, MOTOR, SAFETY, SENSOR, devices_of
 from rsea_ros.nodes._devices import DEVICES
 from rsea_ros.nodes._drive import SignalListener, step
@@ -30,7 +29,7 @@ from rsea_ros.nodes._joint import DrivenJoint, Offer, stop_of
 from rsea_ros.nodes._joints import JOINTS, Jobs, joint_table, joint_values
 from rsea_ros.nodes._parameters import NodeParameter, let_change, live
 from rsea_ros.nodes._realtime import REALTIME, keep_time, stop_keeping_time
-from rsea_ros.nodes._run import run_node
+from rsea_ros.nodes._run import Component
 
 TABLE = (
     NodeParameter("device", "simulated", f"what to drive: {', '.join(DEVICES)}, or one of RSEA_DEVICES"),
@@ -256,13 +255,11 @@ class DriverNode(ManagedEntity):
         return ", ".join(done)
 
 
-def main() -> int:
-    """Run the node."""
-    return run_node(
-        "driver", TABLE, DriverNode, kind=LifecycleNode, more=lambda given: joint_table(TABLE, given),
-        waits_for_nobody=True,
-    )  # fmt: skip
-
+NODE = Component(
+    "driver", TABLE, DriverNode, kind=LifecycleNode, more=lambda given: joint_table(TABLE, given),
+    waits_for_nobody=True,
+)  # fmt: skip
+main = NODE.run
 
 if __name__ == "__main__":
     sys.exit(main())

@@ -27,7 +27,7 @@ from rsea_ros.nodes._health import OK, STEADY, WARN, Health, NodeHealth
 from rsea_ros.nodes._joint_inputs import Events, HealthInputs, noise_from
 from rsea_ros.nodes._parameters import AXIS, JOINT, NodeParameter, let_change, live
 from rsea_ros.nodes._qos import COMMAND
-from rsea_ros.nodes._run import NAMESPACE, Program, run_node
+from rsea_ros.nodes._run import NAMESPACE, Component, Program
 from rsea_ros.outputs.files import unused_path
 
 SEVERE = ("RSEA_SENSOR_FROZEN", "RSEA_SENSOR_MISSING")
@@ -318,10 +318,8 @@ class HealthNode(Program):
         self._keeper.close()
 
 
-def main() -> int:
-    """Run the node."""
-    return run_node("health", TABLE, HealthNode)
-
+NODE = Component("health", TABLE, HealthNode)
+main = NODE.run
 
 if __name__ == "__main__":
     sys.exit(main())

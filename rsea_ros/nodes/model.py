@@ -26,7 +26,7 @@ from rsea_ros.nodes._joint_inputs import InputSettings, ModelInputs, noise_from,
 from rsea_ros.nodes._parameters import AXIS, JOINT, NodeParameter, let_change, live
 from rsea_ros.nodes._qos import COMMAND, LATCHED, RECORD_RELIABLE, await_arrival
 from rsea_ros.nodes._realtime import REALTIME, keep_time
-from rsea_ros.nodes._run import Program, run_node
+from rsea_ros.nodes._run import Component, Program
 from rsea_ros.nodes._waiter import Waiter
 
 EVERY = 128
@@ -284,10 +284,8 @@ class ModelNode(Program):
         self._flags.lower()
 
 
-def main() -> int:
-    """Run the node."""
-    return run_node("model", TABLE, ModelNode)
-
+NODE = Component("model", TABLE, ModelNode)
+main = NODE.run
 
 if __name__ == "__main__":
     sys.exit(main())

@@ -14,7 +14,7 @@ from msg_adapters.topic_map import JOINT_STATE, WRENCH
 from rsea_ros.nodes._health import OK, STEADY, WARN, Health, NodeHealth
 from rsea_ros.nodes._parameters import NodeParameter
 from rsea_ros.nodes._qos import RECORD, RECORD_RELIABLE
-from rsea_ros.nodes._run import run_node
+from rsea_ros.nodes._run import Component
 from rsea_ros.nodes._tap import Tap
 from rsea_ros.outputs.files import unused_path
 
@@ -104,10 +104,8 @@ class RecordNode:
         return NodeHealth(WARN if lost else OK, summary, {**self._counts(), "lost_messages": lost})
 
 
-def main() -> int:
-    """Run the node."""
-    return run_node("record", TABLE, RecordNode)
-
+NODE = Component("record", TABLE, RecordNode)
+main = NODE.run
 
 if __name__ == "__main__":
     sys.exit(main())

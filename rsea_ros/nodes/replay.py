@@ -19,7 +19,7 @@ from rsea_ros.nodes._health import OK, STEADY, Health, NodeHealth
 from rsea_ros.nodes._parameters import NodeParameter
 from rsea_ros.nodes._qos import COMMAND, DISCOVERY_TIME, LATCHED, RECORD_RELIABLE
 from rsea_ros.nodes._realtime import Worker
-from rsea_ros.nodes._run import run_node
+from rsea_ros.nodes._run import Component
 
 TABLE = (
     NodeParameter("bag", "", "bag to play, a directory or a file"),
@@ -117,10 +117,8 @@ class ReplayNode(Worker):
         return NodeHealth(OK, "playing", {"played": self._played, "messages": len(self._rows)})
 
 
-def main() -> int:
-    """Run the node."""
-    return run_node("replay", TABLE, ReplayNode, endless=False)
-
+NODE = Component("replay", TABLE, ReplayNode, endless=False)
+main = NODE.run
 
 if __name__ == "__main__":
     sys.exit(main())

@@ -53,7 +53,8 @@ def put(listener):
         for name, value in values.items():
             told = ParameterValue(type=DOUBLE, double_value=value)
             request.parameters.append(Parameter(name=name.replace("__", "."), value=told))
-        service = f"{node.get_fully_qualified_name()}/set_parameters_atomically"
+        name = node if isinstance(node, str) else node.get_fully_qualified_name()
+        service = f"{name}/set_parameters_atomically"
         answer = listener.call(service, SetParametersAtomically, request).result
         assert answer.successful == (not answer.reason)
         return answer.reason
