@@ -1,6 +1,7 @@
 """Topics of a bench: what it publishes, what it hears, and the states of several joints in one message."""
 
 import math
+import sys
 import time
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -17,7 +18,7 @@ from rsea_ros.nodes._cycle import Anchor, Cycle
 from rsea_ros.nodes._health import OK, WARN, NodeHealth
 from rsea_ros.nodes._mailbox import Mailbox, MessageFields
 from rsea_ros.nodes._parameters import JOINT, NodeParameter
-from rsea_ros.nodes._qos import COMMAND, MEASURED, OVERRIDES
+from rsea_ros.nodes._qos import COMMAND, MEASURED, MEASUREMENT, OVERRIDES
 
 
 class Obeyed:
@@ -35,6 +36,43 @@ class Obeyed:
             return False
         self._who, self._heard = who, now
         return True
+
+
+class Namesakes:
+    """Other nodes of this one's name that publish its joint states (topic).
+
+    The graph knows a node that was killed for seconds more; it is silent, and its successor is alone.
+    """
+
+    def __init__(self, node: Node, topic: str) -> None:
+        self._node, self._topic, self._who = node, topic, set[bytes]()
+        self._box: Mailbox | None = None
+
+    def look(self) -> str:
+        """Return what was heard of them since the last call, in words; empty for nothing."""
+        own = self._node.get_name(), self._node.get_namespace()
+        self._who.clear()
+        if self._node.get_node_names_and_namespaces().count(own) < 2:
+            self.close()
+        elif self._box is None:
+            read = MessageFields(JOINT_STATE, (("position", 0),), most=sys.maxsize)
+            self._box = Mailbox(self._node, self._topic, read, MEASUREMENT, lambda: None, admit=self._meet)
+        else:
+            list(self._box.take())
+        if len(self._who) < 2:
+            return ""
+        name = self._node.get_fully_qualified_name()
+        return f"{len(self._who)} nodes are called {name} and publish {self._topic}, expected one"
+
+    def close(self) -> None:
+        """Listen no more."""
+        if self._box is not None:
+            self._node.destroy_subscription(self._box.subscription)
+        self._box = None
+
+    def _meet(self, who: Any) -> bool:
+        self._who.add(bytes(who))
+        return False
 
 
 NAMES = (
@@ -83,6 +121,7 @@ class BenchTopics:
         self._reported: Mapping[str, int] = {}
         self._polled = 0
         self._states = _publisher(node, ros.JointState, f"{within}joint_states")
+        self.namesakes = Namesakes(node, f"{within}joint_states")
         self._ft = _publisher(node, ros.WrenchStamped, f"{within}ft")
         joint, frame, ft_frame = (names[p.name] for p in NAMES)
         self._state_writer = RawWriter(
@@ -165,6 +204,7 @@ class BenchTopics:
         for publisher in filter(None, (self._states, self._ft, self._deflections)):
             self._node.destroy_publisher(publisher)
         self._node.destroy_subscription(self._wanted.subscription)
+        self.namesakes.close()
 
     def _admit(self, who: object) -> bool:
         return self._obeyed.admit(who, time.monotonic_ns())

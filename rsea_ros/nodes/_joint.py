@@ -52,7 +52,7 @@ class DrivenJoint:
         self.drive: DriverCycle | None = None
         self.topics: BenchTopics | None = None
         self._cycle: Cycle | None = None
-        self._ended = ""
+        self._ended = self._double = ""
         self._reported: tuple[DeviceFault | None, int] = (None, 0)
         self._health = Health(node, self.report, part=part)
         space, after = f"{part}/" if part else "", self._health.publish
@@ -107,6 +107,8 @@ class DrivenJoint:
         zero_first: whether that one must be zero. Raises ParameterError where nothing limits a free end.
         """
         assert self.drive is not None
+        if self._double:
+            raise DeviceError(f"{self._double}: their torques and measurements would mix")
         if not self._values["allow_no_position_limit"]:
             check_travel(self.guarded.guard.limits.position, load_rig(self._values["rig"]))
         with self.drive.deaf():
@@ -117,6 +119,7 @@ class DrivenJoint:
         """Take the topics away; the device is closed already, or not open."""
         if self.topics is not None:
             self.topics.close()
+        self._double = ""
         self._cycle = self.topics = self.drive = None
 
     def publish(self, state: State) -> None:
@@ -179,7 +182,7 @@ class DrivenJoint:
         self._cycle.rest()
         fault, cycles = self.guarded.fault, self.guarded.cycles
         lost = {words: cycles[name] for name, words in LOST.items()} if fault is None else {}
-        report = self.topics.report(self._cycle, lost)
+        report, self._double = self.topics.report(self._cycle, lost), self.topics.namesakes.look()
         values = {
             "active": self.guarded.enabled,
             "fault": fault or "none",
@@ -195,6 +198,9 @@ class DrivenJoint:
             **self.guarded.device.health(),
         }
         told, level = (f"fault {fault}", ERROR) if fault is not None else (self.guarded.contradiction, WARN)
+        if self._double:
+            told, level = "; ".join(filter(None, (self._double, told))), ERROR
+            self._node.get_logger().error(self.with_name(self._double), throttle_duration_sec=10.0)
         if not told:
             return NodeHealth(report.level, report.summary, values)
         besides = "" if report.level == OK else f"; {report.summary}"

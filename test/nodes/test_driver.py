@@ -107,3 +107,19 @@ def test_after_an_exception_the_device_is_closed_at_zero_torque_and_can_be_confi
     spy.fault = None
     node.trigger_configure()
     assert node._state_machine.current_state[1] == "inactive" and spy.opened
+
+
+def test_a_second_driver_of_one_name_is_told_by_both_and_not_activated(listener, make_driver, monkeypatch):
+    """Both published joint_states and moved what they had; nobody said a word."""
+    monkeypatch.setattr(driver, "DEVICES", {"simulated": lambda values: Spy()})
+    values = {p.name: p.default for p in driver.TABLE} | {"rate": 100.0}
+    (first, node), (second, other) = (make_driver("twin", values | {"autostart": k == 0}) for k in range(2))
+    other.trigger_configure()
+    told = "2 nodes are called /twin/twin and publish joint_states, expected one"
+    for program in (first, second):
+        listener.until(lambda program=program: told in program.joints[0].report().summary)
+    other.trigger_activate()
+    assert other._state_machine.current_state[1] == "inactive"
+    assert node._state_machine.current_state[1] == "active"
+    other.trigger_cleanup()
+    listener.until(lambda: told not in first.joints[0].report().summary)
