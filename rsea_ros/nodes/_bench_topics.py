@@ -13,12 +13,15 @@ from msg_adapters import ros
 from msg_adapters.cdr import VALUES, RawWriter
 from msg_adapters.topic_map import FLOATS, JOINT_STATE, TYPES
 from rsea_ros.hardware.device import State
-from rsea_ros.nodes._commands import HORIZON, CommandQueue
+from rsea_ros.nodes._commands import HORIZON, WATCHDOG, CommandQueue
 from rsea_ros.nodes._cycle import Anchor, Cycle
 from rsea_ros.nodes._health import OK, WARN, NodeHealth
 from rsea_ros.nodes._mailbox import Mailbox, MessageFields
 from rsea_ros.nodes._parameters import JOINT, NodeParameter
 from rsea_ros.nodes._qos import COMMAND, MEASURED, MEASUREMENT, OVERRIDES
+
+_AHEAD = "commands ahead"
+"""Of who stamps ahead: then late ones are. Who stamps when sending is always late, and means on arrival."""
 
 
 class Obeyed:
@@ -180,6 +183,7 @@ class BenchTopics:
         counts = {
             "cycles missed": timing.missed,
             "commands late": commands.late,
+            _AHEAD: commands.ahead,
             "commands with a stamp that is off": commands.off,
             "commands refused": commands.refused - (commands.off if self._strict else 0),
             "commands of a second publisher ignored": self._obeyed.ignored,
@@ -188,7 +192,10 @@ class BenchTopics:
         }
         new = {kind: count - self._reported.get(kind, 0) for kind, count in counts.items()}
         self._reported = {**self._reported, **counts}
+        now_stamped = not new.pop(_AHEAD) and commands.lateness <= WATCHDOG and new.pop("commands late")
+        commands.lateness = 0
         troubles = [f"{count} {kind}" for kind, count in new.items() if count > 0]
+        note = f"; {now_stamped} commands stamped when sent act on arrival" if now_stamped else ""
         values = {
             **timing.values(),
             "lost_cycles": cycle.left_out,
@@ -197,7 +204,7 @@ class BenchTopics:
             "furthest_stamp_s": f"{commands.furthest:+.3f}",
             **cycle.anchor.values(),
         }
-        return NodeHealth(WARN if troubles else OK, ", ".join(troubles) or "running", values)
+        return NodeHealth(WARN if troubles else OK, (", ".join(troubles) or "running") + note, values)
 
     def close(self) -> None:
         """Take the topics away."""

@@ -9,7 +9,7 @@ from rclpy.clock_type import ClockType
 from rclpy.node import Node
 
 from msg_adapters.ros import ERROR, OK, WARN, DiagnosticArray, diagnostics_message
-from rsea_ros.nodes._qos import COMMAND
+from rsea_ros.nodes._qos import COMMAND, Incompatible
 
 __all__ = ["ERROR", "OK", "STEADY", "WARN", "Health", "NodeHealth"]
 
@@ -41,6 +41,10 @@ class Health:
         name = f"{self._node.get_fully_qualified_name()}{self._part}"
         try:
             report = self._assess()
+            if lines := Incompatible.words(self._node):
+                told = report.summary if report.level != OK else ""
+                words = "; ".join(filter(None, (told, *lines)))
+                report = NodeHealth(max(report.level, WARN), words, report.values)
         except Exception as error:
             text = f"no assessment: {type(error).__name__}: {error}"
             self._node.get_logger().error(text, throttle_duration_sec=10.0)
