@@ -12,7 +12,15 @@ from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import WrenchStamped
 from lifecycle_msgs.srv import ChangeState, GetAvailableTransitions, GetState
-from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
+from rcl_interfaces.msg import (
+    FloatingPointRange,
+    IntegerRange,
+    Parameter,
+    ParameterDescriptor,
+    ParameterEvent,
+    SetParametersResult,
+)
+from rcl_interfaces.srv import GetParameters, ListParameters
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool
@@ -23,7 +31,8 @@ from rsea_ros.errors import ParameterError
 
 __all__ = [
     "Bool", "ChangeState", "Clock", "DiagnosticArray", "DiagnosticStatus", "GetAvailableTransitions",
-    "GetState", "JointState", "SetParametersResult", "Time", "Trigger", "WrenchStamped",
+    "GetParameters", "GetState", "JointState", "ListParameters", "SetParametersResult", "Time", "Trigger",
+    "WrenchStamped",
 ]  # fmt: skip
 
 OK, WARN, ERROR, STALE = (b"\x00", b"\x01", b"\x02", b"\x03")
@@ -130,6 +139,12 @@ def parameter_descriptor(
     elif bounds is not None:
         descriptor.floating_point_range = [FloatingPointRange(from_value=bounds[0], to_value=bounds[1])]
     return descriptor
+
+
+def parameters_message(stamp_ns: int, node: str, values: Mapping[str, Any]) -> ParameterEvent:
+    """Return the parameters of a node, values as GetParameters answers, as on /parameter_events."""
+    parameters = [Parameter(name=name, value=value) for name, value in values.items()]
+    return ParameterEvent(stamp=time_of(stamp_ns), node=node, new_parameters=parameters)
 
 
 def message_type(name: str) -> Any:

@@ -70,6 +70,10 @@ def policies(joints: Sequence[str] = ()) -> str:
             os.chdir(before)
     heard = {name for each in nodes.values() for name in each["topics", "publish"]}
     served = {name for each in nodes.values() for name in each["services", "reply"]}
+    for (_, name), each in nodes.items():
+        if name == "record":
+            asked = {s for s in served if s.endswith(("/list_parameters", "/get_parameters"))}
+            each["services", "request"] |= asked
     person: Interfaces = {("topics", "subscribe"): heard, ("services", "request"): served}
     return document({**nodes, (NAMESPACE, OPERATOR): person})
 

@@ -42,6 +42,29 @@ def await_arrival(publisher: Publisher[Any]) -> None:
     publisher.wait_for_all_acked(ARRIVAL)
 
 
+RECORD_LATCHED = QoSProfile(
+    depth=200, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
+)
+"""Of what was published last before the recording began."""
+
+
+def offered(node: Node, topic: str) -> list[dict[str, Any]]:
+    """Return the QoS of each publisher of a topic as rosbag2 writes it (metadata version 9)."""
+    found = []
+    for info in node.get_publishers_info_by_topic(topic):
+        qos = info.qos_profile
+        spans = ((name, getattr(qos, name).nanoseconds) for name in ("deadline", "lifespan"))
+        times = {name: {"sec": ns // SECOND, "nsec": ns % SECOND} for name, ns in spans}
+        lease = qos.liveliness_lease_duration.nanoseconds
+        found.append({
+            "history": qos.history.short_key, "depth": qos.depth, "reliability": qos.reliability.short_key,
+            "durability": qos.durability.short_key, **times, "liveliness": qos.liveliness.short_key,
+            "liveliness_lease_duration": {"sec": lease // SECOND, "nsec": lease % SECOND},
+            "avoid_ros_namespace_conventions": qos.avoid_ros_namespace_conventions,
+        })  # fmt: skip
+    return found
+
+
 class Incompatible(SubscriptionEventCallbacks):
     """Has a node tell of partners whose QoS does not fit one of its subscriptions, polled or not.
 
@@ -50,13 +73,15 @@ class Incompatible(SubscriptionEventCallbacks):
 
     _asked: ClassVar[WeakKeyDictionary[Node, dict[str, QoSProfile]]] = WeakKeyDictionary()
 
-    def __init__(self, node: Node, topic: str, qos: QoSProfile) -> None:
+    def __init__(self, node: Node, topic: str, qos: QoSProfile, **others: Any) -> None:
+        """others: callbacks of other events."""
+
         def tell(event: Any) -> None:
             self._asked.setdefault(node, {})[topic] = qos
             for line in self.words(node):
                 node.get_logger().warning(line)
 
-        super().__init__(incompatible_qos=tell)
+        super().__init__(incompatible_qos=tell, **others)
         self._group = node.default_callback_group
 
     def create_event_handlers(self, callback_group: Any, subscription: Any, topic_name: str) -> Any:

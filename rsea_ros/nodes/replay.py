@@ -67,7 +67,7 @@ class ReplayNode(Worker):
         """Return a publisher for each topic whose type is installed."""
         publishers = {}
         for topic, kind in topics:
-            qos = LATCHED if topic.endswith("/pure_torque") else RECORD_RELIABLE
+            qos = LATCHED if topic.endswith(("/pure_torque", "/pure_torque_stamped")) else RECORD_RELIABLE
             try:
                 publishers[topic] = self._node.create_publisher(message_type(kind), topic, qos)
             except ParameterError as error:
