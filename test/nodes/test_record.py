@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import time
+
+import numpy as np
 import pytest
 import yaml
 from rcl_interfaces.msg import ParameterEvent
+from rclpy.qos import qos_profile_sensor_data
 from rclpy.serialization import deserialize_message
 
-from msg_adapters import iterate
-from msg_adapters.ros import Bool, JointState, torque_command_message
+from msg_adapters import BagWriter, iterate
+from msg_adapters.ros import Bool, Clock, JointState, torque_command_message
 from rsea_ros.nodes._qos import COMMAND, LATCHED
 from rsea_ros.nodes.joint import compose
 from test.nodes.test_live_parameters import put
@@ -56,3 +60,23 @@ def test_a_bag_has_the_flag_parameters_offered_qos_and_the_distribution(listener
     (qos,) = offered[f"/{storage}/desired_torque"]
     assert (qos["reliability"], qos["durability"]) == ("reliable", "volatile")
     assert {each["durability"] for each in offered[f"/{storage}/pure_torque"]} == {"transient_local"}
+
+
+def test_the_clock_of_a_replay_goes_on_through_a_pause_and_follows_its_pace(listener, tmp_path):
+    """It stood still for as long as the bag had no message."""
+    with BagWriter(tmp_path / "bag") as bag:
+        for second in (100, 101):
+            bag.write("/still/flag", "std_msgs/msg/Bool", second * 10**9, bytes([0, 1, 0, 0, 1]))
+    heard = []
+    told = "/clock", lambda m: heard.append((time.monotonic(), m.clock.sec + 1e-9 * m.clock.nanosec))
+    listener.subscriptions.append(listener.node.create_subscription(Clock, *told, qos_profile_sensor_data))
+    given = {"bag": str(tmp_path / "bag"), "subscribers": 0, "rate": 2.0}
+    replay = compose("replay", listener._executor, given)
+    try:
+        listener.until(replay.program.is_finished)
+    finally:
+        replay.close()
+    at, clock = np.array(heard).T
+    assert len(at) > 25 and clock[0] < 100.4 and clock[-1] > 100.7
+    lag = at - clock / 2.0
+    assert np.ptp(lag) < 0.2 and np.all(np.diff(clock) >= 0.0)
