@@ -10,6 +10,7 @@ from rclpy.node import Node
 
 from msg_adapters.ros import ERROR, OK, WARN, DiagnosticArray, diagnostics_message
 from rsea_ros.nodes._qos import COMMAND, Incompatible
+from rsea_ros.nodes._realtime import raise_new_threads
 
 __all__ = ["ERROR", "OK", "STEADY", "WARN", "Health", "NodeHealth"]
 
@@ -37,7 +38,8 @@ class Health:
         node.create_timer(1.0, self.publish, clock=STEADY)
 
     def publish(self) -> None:
-        """Publish now. An assessment that fails is an error of its own, and ends no node."""
+        """Publish now, and see to new threads. An assessment that fails is an error, and ends no node."""
+        raise_new_threads()
         name = f"{self._node.get_fully_qualified_name()}{self._part}"
         try:
             report = self._assess()
