@@ -5,12 +5,16 @@ Fast DDS gives messages to listeners on the same machine through shared memory. 
 interpreter meanwhile: the cycle stands still under torque.
 """
 
+import faulthandler
+import math
 import os
 import signal
 import sys
+import threading
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from types import FrameType
 from typing import Any, Protocol
@@ -81,6 +85,7 @@ class Component:
     endless: a signal of STOPPING is the regular end; any other end by a signal is an interruption (status
     128 plus its number).
     more: parameters beside those of the table, from the given ones. waits_for_nobody: see publish_by_sockets.
+    patience: s from a signal to an end by force, of a node that leaves nothing undone; told is where it was.
     """
 
     name: str
@@ -90,6 +95,7 @@ class Component:
     endless: bool = True
     more: Callable[[Mapping[str, Any]], Sequence[NodeParameter]] = lambda given: ()
     waits_for_nobody: bool = False
+    patience: float = math.inf
 
     def run(self) -> int:
         """Run one node in this process and return the exit status."""
@@ -132,7 +138,10 @@ def run_nodes(components: Sequence[Component], arguments: Sequence[str] = ()) ->
         sys.stdout.write("\n".join(usage(each.name, each.table) for each in components))
         return SUCCESS
     stop, log = _Stop(), get_logger(components[0].name)
+    patience, listener = max(each.patience for each in components), None
     try:
+        if math.isfinite(patience):
+            listener = SignalListener(partial(faulthandler.dump_traceback_later, patience, exit=True))
         _initialise(arguments, waits_for_nobody=any(each.waits_for_nobody for each in components))
         if effects := os.environ.get("RSEA_EFFECTS"):
             log.warning(f"RSEA_EFFECTS={printable(effects)}: code from there runs in this node")
@@ -146,6 +155,39 @@ def run_nodes(components: Sequence[Component], arguments: Sequence[str] = ()) ->
         return BAD_INPUT
     finally:
         rclpy.try_shutdown()
+        if listener is not None:
+            listener.close()
+            faulthandler.cancel_dump_traceback_later()
+
+
+class SignalListener:
+    """Call `react()`, in a thread, at the first signal that ends the process, beside the handlers it has."""
+
+    def __init__(self, react: Callable[[], None]) -> None:
+        self._react = react
+        self._outlet, self._inlet = os.pipe()
+        os.set_blocking(self._inlet, False)
+        self._main = threading.current_thread() is threading.main_thread()  # not permitted to other users
+        if self._main:
+            self._before = signal.set_wakeup_fd(self._inlet, warn_on_full_buffer=False)
+        self._thread = threading.Thread(target=self._listen, daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """Listen no more."""
+        if self._inlet < 0:
+            return
+        if self._main:
+            signal.set_wakeup_fd(self._before)
+        os.close(self._inlet)
+        self._inlet = -1
+        self._thread.join()
+        os.close(self._outlet)
+
+    def _listen(self) -> None:
+        while numbers := os.read(self._outlet, 64):
+            if set(ENDING).intersection(numbers):
+                self._react()
 
 
 class _Stop:

@@ -24,12 +24,12 @@ from rsea_ros.nodes._bench_topics import COMMAND_TYPE, NAMES, SPRING_FRAME, Comb
 from rsea_ros.nodes._cycle import Anchor, Cycle
 from rsea_ros.nodes._device_parameters import ENCODER, LIMITS, MOTOR, SAFETY, SENSOR, devices_of
 from rsea_ros.nodes._devices import DEVICES
-from rsea_ros.nodes._drive import SignalListener, step
+from rsea_ros.nodes._drive import step
 from rsea_ros.nodes._joint import DrivenJoint, Offer, stop_of
 from rsea_ros.nodes._joints import JOINTS, Jobs, joint_table, joint_values
 from rsea_ros.nodes._parameters import NodeParameter, let_change, live
 from rsea_ros.nodes._realtime import REALTIME, keep_time, stop_keeping_time
-from rsea_ros.nodes._run import Component
+from rsea_ros.nodes._run import Component, SignalListener
 
 TABLE = (
     NodeParameter("device", "simulated", f"what to drive: {', '.join(DEVICES)}, or one of RSEA_DEVICES"),

@@ -284,7 +284,7 @@ class ModelNode(Program):
         self._flags.lower()
 
 
-NODE = Component("model", TABLE, ModelNode)
+NODE = Component("model", TABLE, ModelNode, patience=8.0)  # ros2 launch kills after 10 s
 main = NODE.run
 
 if __name__ == "__main__":

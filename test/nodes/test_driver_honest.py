@@ -13,8 +13,8 @@ import pytest
 
 from msg_adapters.ros import JointState, torque_command_message
 from rsea_ros.nodes._bench_topics import Obeyed
-from rsea_ros.nodes._drive import SignalListener
 from rsea_ros.nodes._qos import COMMAND
+from rsea_ros.nodes._run import SignalListener
 from rsea_ros.nodes._waiter import Pulse, anything_to_do
 from test.nodes.clock_shim import preload, set_clock
 from test.nodes.conftest import as_argument
