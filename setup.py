@@ -11,8 +11,8 @@ from xml.etree import ElementTree
 from setuptools import find_packages, setup
 
 NODES = (
-    "controller", "driver", "excite", "experiment", "health", "identify", "model", "plant", "record",
-    "replay", "watch",
+    "controller", "driver", "excite", "experiment", "health", "identify", "joint", "model", "plant",
+    "record", "replay", "watch",
 )  # fmt: skip
 MANIFEST = ElementTree.parse("package.xml").getroot()
 NAME = MANIFEST.findtext("name")

@@ -180,6 +180,7 @@ class Topic:
     msgtype: str
     digest: str
     count: int = 0
+    qos: Sequence[Mapping[str, Any]] = ()
 
 
 @dataclass(frozen=True)
@@ -264,8 +265,9 @@ def _expect(value: Any, is_so: bool, expected: str, name: str = "") -> Any:
 
 
 def metadata_text(
-    file: Path, storage: str, topics: Sequence[Topic], span: tuple[int, int], remarks: Remarks
-) -> str:
+    file: Path, storage: str, topics: Sequence[Topic], span: tuple[int, int], remarks: Remarks,
+    distribution: str = "rsea_ros",
+) -> str:  # fmt: skip
     """Return the metadata of a bag of one file; span is its first and last log time, ns."""
     document: Mapping[str, Any] = {
         "version": VERSION,
@@ -277,7 +279,7 @@ def metadata_text(
                     "name": topic.name,
                     "type": topic.msgtype,
                     "serialization_format": "cdr",
-                    "offered_qos_profiles": [],
+                    "offered_qos_profiles": list(topic.qos),
                     "type_description_hash": topic.digest,
                 },
                 "message_count": topic.count,
@@ -289,7 +291,7 @@ def metadata_text(
         "relative_file_paths": [file.name],
         "files": [{"path": file.name, **_amount(topics, span)}],
         "custom_data": remarks.texts() or None,
-        "ros_distro": "rsea_ros",
+        "ros_distro": distribution,
     }
     return str(yaml.safe_dump({ROOT: document}, sort_keys=False))
 

@@ -46,8 +46,8 @@ class McapStorage:
         self._remarks = 0
         self._put(mcap.MAGIC + _record(mcap.HEADER, _text("ros2"), _text("rsea_ros")))
 
-    def add(self, topic: str, msgtype: str) -> int:
-        """Declare a topic; return its key."""
+    def add(self, topic: str, msgtype: str, offered: str = "[]") -> int:
+        """Declare a topic with the offered QoS as YAML; return its key."""
         if msgtype not in self._types:
             schema = self._types[msgtype] = len(self._types) + 1
             text, _ = definition(msgtype)
@@ -56,7 +56,7 @@ class McapStorage:
             self._chunk += record
         key = len(self._counts) + 1
         self._counts[key] = 0
-        qos = _text("offered_qos_profiles") + _text("[]")
+        qos = _text("offered_qos_profiles") + _text(offered)
         head = struct.pack("<HH", key, self._types[msgtype])
         record = _record(mcap.CHANNEL, head, _text(topic), _text("cdr"), _with_size(qos))
         self._channels += record

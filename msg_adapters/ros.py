@@ -12,7 +12,15 @@ from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import WrenchStamped
 from lifecycle_msgs.srv import ChangeState, GetAvailableTransitions, GetState
-from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
+from rcl_interfaces.msg import (
+    FloatingPointRange,
+    IntegerRange,
+    Parameter,
+    ParameterDescriptor,
+    ParameterEvent,
+    SetParametersResult,
+)
+from rcl_interfaces.srv import GetParameters, ListParameters
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool
@@ -23,7 +31,8 @@ from rsea_ros.errors import ParameterError
 
 __all__ = [
     "Bool", "ChangeState", "Clock", "DiagnosticArray", "DiagnosticStatus", "GetAvailableTransitions",
-    "GetState", "JointState", "Time", "Trigger", "WrenchStamped",
+    "GetParameters", "GetState", "JointState", "ListParameters", "SetParametersResult", "Time", "Trigger",
+    "WrenchStamped",
 ]  # fmt: skip
 
 OK, WARN, ERROR, STALE = (b"\x00", b"\x01", b"\x02", b"\x03")
@@ -118,17 +127,24 @@ def statuses_message(
 
 
 def parameter_descriptor(
-    description: str, constraints: str = "", bounds: tuple[float, float] | tuple[int, int] | None = None
-) -> ParameterDescriptor:
-    """Return the descriptor of a parameter that is fixed once the node runs; bounds are inclusive."""
+    description: str, constraints: str = "", bounds: tuple[float, float] | tuple[int, int] | None = None,
+    *, fixed: bool = True,
+) -> ParameterDescriptor:  # fmt: skip
+    """Return the descriptor of a parameter; bounds are inclusive. fixed: once the node runs."""
     descriptor = ParameterDescriptor(
-        description=description, additional_constraints=constraints, read_only=True
+        description=description, additional_constraints=constraints, read_only=fixed
     )
     if bounds is not None and isinstance(bounds[0], int):
         descriptor.integer_range = [IntegerRange(from_value=bounds[0], to_value=int(bounds[1]))]
     elif bounds is not None:
         descriptor.floating_point_range = [FloatingPointRange(from_value=bounds[0], to_value=bounds[1])]
     return descriptor
+
+
+def parameters_message(stamp_ns: int, node: str, values: Mapping[str, Any]) -> ParameterEvent:
+    """Return the parameters of a node, values as GetParameters answers, as on /parameter_events."""
+    parameters = [Parameter(name=name, value=value) for name, value in values.items()]
+    return ParameterEvent(stamp=time_of(stamp_ns), node=node, new_parameters=parameters)
 
 
 def message_type(name: str) -> Any:

@@ -154,16 +154,16 @@ class SqliteStorage:
         with _system_errors():
             self._database.executescript(Sqlite3Writer.SQLITE_SCHEMA)
 
-    def add(self, topic: str, msgtype: str) -> int:
-        """Declare a topic; return its key."""
+    def add(self, topic: str, msgtype: str, offered: str = "[]") -> int:
+        """Declare a topic with the offered QoS as YAML; return its key."""
         text, digest = definition(msgtype)
         with _system_errors():
             if msgtype not in self._types:
                 self._types.add(msgtype)
                 row = "INSERT INTO message_definitions VALUES (NULL, ?, 'ros2msg', ?, ?)"
                 self._database.execute(row, (msgtype, text, digest))
-            row = "INSERT INTO topics VALUES (NULL, ?, ?, 'cdr', '[]', ?)"
-            return int(self._database.execute(row, (topic, msgtype, digest)).lastrowid or 0)
+            row = "INSERT INTO topics VALUES (NULL, ?, ?, 'cdr', ?, ?)"
+            return int(self._database.execute(row, (topic, msgtype, offered, digest)).lastrowid or 0)
 
     def write(self, key: int, log_time: int, raw: bytes) -> None:
         """Append a serialised message."""

@@ -9,8 +9,10 @@ from contextlib import contextmanager, suppress
 from itertools import count
 from pathlib import Path
 from types import TracebackType
+from typing import Any
 
 import numpy as np
+import yaml
 
 from msg_adapters.contents import METADATA, Remarks, Topic, metadata_text
 from msg_adapters.mcap_storage import McapStorage
@@ -42,13 +44,14 @@ class BagWriter:
     recording: written data are worth keeping. Then Ctrl-C completes the bag, and a failure
     leaves NAME.partial, a readable bag. Otherwise either removes the data.
     force: an existing bag may be replaced.
-    interval: s, after which recorded data are put on the disk.
+    interval: s, after which recorded data are put on the disk. distribution: of ROS; empty: none wrote it.
     Raises BagError for a path that is taken and for a disk that is full.
     """
 
     def __init__(
         self, path: str | Path, storage: str = "mcap", *, recording: bool = True,
         remarks: Remarks | None = None, force: bool = False, interval: float = INTERVAL,
+        distribution: str = "",
     ) -> None:  # fmt: skip
         self.path = Path(path)
         by_suffix = {suffix: name for name, (suffix, _) in STORAGES.items()}
@@ -57,7 +60,7 @@ class BagWriter:
         if self._kind not in STORAGES:
             raise BagError(f"{path}: storage {storage!r}, expected one of {', '.join(STORAGES)}")
         self._recording, self._force, self._interval = recording, force, interval
-        self.remarks = remarks or Remarks()
+        self.remarks, self._distribution = remarks or Remarks(), distribution or "rsea_ros"
         self._topics: dict[str, tuple[int, Topic]] = {}
         self._span = (0, 0)
         self._flushed = time.monotonic()
@@ -98,6 +101,11 @@ class BagWriter:
             self._count(known, 1, log_time, log_time)
         self.keep_up()
 
+    def offer(self, topic: str, msgtype: str, qos: Sequence[Mapping[str, Any]]) -> None:
+        """Declare a topic with the QoS that its publishers offer, before its first message."""
+        if topic not in self._topics:
+            self._declare(topic, msgtype, qos)
+
     def write_all(
         self, topics: Sequence[tuple[str, str]], which: IntArray, log_times: IntArray, raws: Sequence[bytes]
     ) -> None:
@@ -115,13 +123,17 @@ class BagWriter:
     def _known(self, topic: str, msgtype: str) -> tuple[int, Topic]:
         """Return key and topic, declared. Raises BagError for a topic of another type than before."""
         if topic not in self._topics:
-            check_topic(topic)
-            known = Topic(topic, msgtype, definition(msgtype)[1])
-            self._topics[topic] = (self._storage.add(topic, msgtype), known)
+            self._declare(topic, msgtype)
         key, known = self._topics[topic]
         if known.msgtype != msgtype:
             raise BagError(f"topic {topic}: is {known.msgtype} and {msgtype}, expected one type")
         return key, known
+
+    def _declare(self, topic: str, msgtype: str, qos: Sequence[Mapping[str, Any]] = ()) -> None:
+        check_topic(topic)
+        known = Topic(topic, msgtype, definition(msgtype)[1], qos=qos)
+        text = yaml.safe_dump(list(qos), sort_keys=False) if qos else "[]"
+        self._topics[topic] = (self._storage.add(topic, msgtype, text), known)
 
     def _count(self, topic: Topic, messages: int, first: int, last: int) -> None:
         topic.count += messages
@@ -193,7 +205,7 @@ class BagWriter:
     def _complete(self) -> None:
         """Close the file, add the metadata, and move everything to its name."""
         file, topics = self._storage.path, [topic for _, topic in self._topics.values()]
-        known = metadata_text(file, self._kind, topics, self._span, self.remarks)
+        known = metadata_text(file, self._kind, topics, self._span, self.remarks, self._distribution)
         if self._single:
             self._storage.remark(self.remarks.texts(), known)
         self._storage.close()

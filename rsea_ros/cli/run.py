@@ -30,7 +30,9 @@ def run(args: argparse.Namespace) -> int:
     """Become the node's process."""
     need_ros()
     names = node_names()
-    words = [*(["--help"] if args.params else []), *ros_arguments(args.parameters), *args.pass_on]
+    kinds = [word for word in args.parameters if args.node == "joint" and ":=" not in word]
+    given = ros_arguments([word for word in args.parameters if word not in kinds])
+    words = [*kinds, *(["--help"] if args.params else []), *given, *args.pass_on]
     if args.node.endswith(".py"):
         if not Path(args.node).is_file():
             raise ParameterError(f"{args.node}: no such file, expected a Python program or a node")

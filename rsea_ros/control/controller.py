@@ -166,6 +166,10 @@ class TorqueController:
         self._age, self._crossed, self._jump = 0, 0.0, softly - desired
         self.share = Share()
 
+    def limit(self, limits: TorqueLimits) -> None:
+        """Keep other limits from the next sample on."""
+        self._limits = limits
+
     def step(
         self,
         reading: Measurement,
@@ -211,7 +215,7 @@ class TorqueController:
         compensated, crossing = self._compensating_torque(reading, forward), self._crossing(ahead)
         known = learned + compensated
         whole = forward + more + back + lead + compensated + crossing
-        torque = min(max(whole, self._sent - most, -largest), self._sent + most, largest)
+        torque = min(max(min(max(whole, self._sent - most), self._sent + most), -largest), largest)
         if (whole - torque) * error > 0.0:
             state = state._replace(slow=self._state.slow, integral=self._state.integral)
         self._remember(hold(state, torque - known), torque, known, learned)

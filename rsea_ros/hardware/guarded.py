@@ -7,7 +7,7 @@ import threading
 import time
 from collections import Counter, deque
 from collections.abc import Callable, Sequence
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack, nullcontext, suppress
 from dataclasses import replace
 from typing import Protocol
 
@@ -20,6 +20,7 @@ from rsea_ros.hardware.limits import (
     Limits,
     Rated,
     Rating,
+    loosened,
     unmeasured_quantities,
     without,
 )
@@ -141,7 +142,7 @@ class GuardedDevice:
         testify: Callable[[Rating], Witnesses | None] = lambda rating: None,
     ) -> None:  # fmt: skip
         self.device, self.guard = device, Guard(limits, 1.0 / rate)
-        self._limits, self._period = limits, 1.0 / rate
+        self._limits, self._period, self._rating = limits, 1.0 / rate, UNRATED
         self._spring, self._derive, self._testify = spring, derive, testify
         self._witnesses: Witnesses | None = None
         self.interlock = self.guard.interlock
@@ -180,10 +181,10 @@ class GuardedDevice:
             losses.clear()
         try:
             self._check_protection(unprotected=unprotected)
-            rating = self.device.rating if isinstance(self.device, Rated) else UNRATED
+            self._rating = self.device.rating if isinstance(self.device, Rated) else UNRATED
             if self._derive is not None:
-                self._limits = self._derive(rating)
-            self._witnesses = self._testify(rating)
+                self._limits = self._derive(self._rating)
+            self._witnesses = self._testify(self._rating)
             self._check_measured()
         except Exception:
             self.device.close()
@@ -213,6 +214,28 @@ class GuardedDevice:
             )
         self.lifted = lacking
         self.guard.limits = without(self._limits, lacking)
+
+    def limit(self, names: Sequence[str]) -> None:
+        """Take over what `derive` returns now for some quantities: lower ones from the next cycle on.
+
+        Raises ParameterError for one that is raised under torque, or beyond what `open` has checked.
+        """
+        derived = self._limits if self._derive is None else self._derive(self._rating)
+        told = {name: text for name, text in self.guard.limits.derived.items() if name not in names}
+        told |= {name: derived.derived[name] for name in names if name in derived.derived}
+        changed = {name: getattr(derived, name) for name in names if name not in self.lifted}
+        limits = replace(self.guard.limits, **changed, derived=told)
+        checked = without(self._limits, self.lifted)
+        if name := loosened(limits, checked):
+            most = "least" if name == "voltage" else "most"
+            raise ParameterError(
+                f"{name} = {getattr(limits, name):g}, expected at {most} {getattr(checked, name):.4g},"
+                " what configure has checked, or cleanup first"
+            )
+        with self._turn if loosened(limits, self.guard.limits) else nullcontext():
+            if self.enabled and (name := loosened(limits, self.guard.limits)):
+                raise ParameterError(f"{name} is raised while active, expected deactivate first")
+            self.guard.limits = limits
 
     def cycle(self, wanted: float, age: float | None) -> State | None:
         """Do a cycle of this device alone, see `together.cycle`."""

@@ -16,6 +16,11 @@ HEARD_LATE = 3
 """Cycles until a torque that was written shows in the measured one."""
 UNFELT = 1.0
 """s without a measurement of a limited quantity that are a fault: the longest ft_timeout of a sensor."""
+CHANGEABLE = (
+    "torque", "slew", "soft_start", "deflection", "velocity", "position", "ft", "power", "effort",
+    "effort_time", "temperature", "current", "voltage", "command_timeout",
+)  # fmt: skip
+"""Quantities whose limit may change while the device is open."""
 NO_LIMIT = {"temperature": math.inf, "current": math.inf, "voltage": 0.0}
 """Quantities that a device may not measure, and the limit that limits nothing."""
 
@@ -109,6 +114,15 @@ def unmeasured_quantities(limits: Limits, state: State) -> list[str]:
 def without(limits: Limits, names: Sequence[str]) -> Limits:
     """Return limits that do not limit some quantities of NO_LIMIT."""
     return Limits(**{**vars(limits), **{name: NO_LIMIT[name] for name in names}})
+
+
+def loosened(limits: Limits, before: Limits) -> str:
+    """Return the first changeable quantity that limits let further than others did, empty for none."""
+    for name in CHANGEABLE:
+        now, then = getattr(limits, name), getattr(before, name)
+        if now < then if name == "voltage" else now > then:
+            return name
+    return ""
 
 
 def ft_torque(limits: Limits, state: State) -> float:
@@ -229,6 +243,7 @@ class Guard:
             self.torque = math.copysign(self._ramp_limit(age), self.torque)
         else:
             self.torque = 0.0
+        self.torque = min(max(self.torque, -limits.torque), limits.torque)  # of a limit that was lowered now
         self._written.append(self.torque)
         return self.torque
 

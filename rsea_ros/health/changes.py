@@ -222,10 +222,15 @@ class Changes:
         self.bank = hypo.Bank(base.rig, self._noise, base.hypotheses, self._settings.hold)
         inner, outer = (np.array([getattr(h, n) for h in base.hypotheses]) for n in ("inner", "outer"))
         loud = np.full(len(hypo.CHANNELS), 1.0)
-        h = threshold(self._settings.rate, 2 * len(inner) + len(hypo.CHANNELS), self._settings.every)
-        self._cusum = Cusum(np.append(inner, LOUD * loud), np.append(outer, LOUDER * loud), h)
+        self._cusum = Cusum(np.append(inner, LOUD * loud), np.append(outer, LOUDER * loud), 0.0)
+        self.watch(self._settings)
         self.estimates = Estimates(base.hypotheses)
         self._wait = self._patience = 0
+
+    def watch(self, settings: WatchSettings) -> None:
+        """Set the threshold of the sums, which go on."""
+        self._settings, count = settings, 2 * len(self._base.hypotheses) + len(hypo.CHANNELS)
+        self._cusum.h = threshold(settings.rate, count, settings.every)
 
     @property
     def suspects(self) -> bool:

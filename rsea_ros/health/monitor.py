@@ -139,6 +139,12 @@ class Monitor:
         self.changes: Changes | None = None
         self.now = -math.inf
 
+    def watch(self, settings: WatchSettings) -> None:
+        """Watch with other thresholds from now on; `learn` counts when it begins to learn anew."""
+        self._settings, self._cutter.every = settings, settings.every
+        if self.changes is not None:
+            self.changes.watch(settings)
+
     def take(self, t: FloatArray, kind: IntArray, values: FloatArray) -> None:
         """Process events (see Look), sorted by stamp; late ones are counted, not used."""
         if len(t) and math.isfinite(self.now) and abs(t[0] - self.now) > JUMP:
@@ -211,3 +217,4 @@ class Monitor:
             next(self._learning)
         except StopIteration as end:
             self.changes = end.value
+            end.value.watch(self._settings)

@@ -1,6 +1,7 @@
 """Topics of a bench: what it publishes, what it hears, and the states of several joints in one message."""
 
 import math
+import sys
 import time
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -12,13 +13,15 @@ from msg_adapters import ros
 from msg_adapters.cdr import VALUES, RawWriter
 from msg_adapters.topic_map import FLOATS, JOINT_STATE, TYPES
 from rsea_ros.hardware.device import State
-from rsea_ros.nodes._anchor import Anchor
-from rsea_ros.nodes._commands import HORIZON, CommandQueue
-from rsea_ros.nodes._cycle import Cycle
+from rsea_ros.nodes._commands import HORIZON, WATCHDOG, CommandQueue
+from rsea_ros.nodes._cycle import Anchor, Cycle
 from rsea_ros.nodes._health import OK, WARN, NodeHealth
 from rsea_ros.nodes._mailbox import Mailbox, MessageFields
 from rsea_ros.nodes._parameters import JOINT, NodeParameter
-from rsea_ros.nodes._qos import COMMAND, MEASURED, OVERRIDES
+from rsea_ros.nodes._qos import COMMAND, MEASURED, MEASUREMENT, OVERRIDES
+
+_AHEAD = "commands ahead"
+"""Of who stamps ahead: then late ones are. Who stamps when sending is always late, and means on arrival."""
 
 
 class Obeyed:
@@ -36,6 +39,43 @@ class Obeyed:
             return False
         self._who, self._heard = who, now
         return True
+
+
+class Namesakes:
+    """Other nodes of this one's name that publish its joint states (topic).
+
+    The graph knows a node that was killed for seconds more; it is silent, and its successor is alone.
+    """
+
+    def __init__(self, node: Node, topic: str) -> None:
+        self._node, self._topic, self._who = node, topic, set[bytes]()
+        self._box: Mailbox | None = None
+
+    def look(self) -> str:
+        """Return what was heard of them since the last call, in words; empty for nothing."""
+        own = self._node.get_name(), self._node.get_namespace()
+        self._who.clear()
+        if self._node.get_node_names_and_namespaces().count(own) < 2:
+            self.close()
+        elif self._box is None:
+            read = MessageFields(JOINT_STATE, (("position", 0),), most=sys.maxsize)
+            self._box = Mailbox(self._node, self._topic, read, MEASUREMENT, lambda: None, admit=self._meet)
+        else:
+            list(self._box.take())
+        if len(self._who) < 2:
+            return ""
+        name = self._node.get_fully_qualified_name()
+        return f"{len(self._who)} nodes are called {name} and publish {self._topic}, expected one"
+
+    def close(self) -> None:
+        """Listen no more."""
+        if self._box is not None:
+            self._node.destroy_subscription(self._box.subscription)
+        self._box = None
+
+    def _meet(self, who: Any) -> bool:
+        self._who.add(bytes(who))
+        return False
 
 
 NAMES = (
@@ -84,6 +124,7 @@ class BenchTopics:
         self._reported: Mapping[str, int] = {}
         self._polled = 0
         self._states = _publisher(node, ros.JointState, f"{within}joint_states")
+        self.namesakes = Namesakes(node, f"{within}joint_states")
         self._ft = _publisher(node, ros.WrenchStamped, f"{within}ft")
         joint, frame, ft_frame = (names[p.name] for p in NAMES)
         self._state_writer = RawWriter(
@@ -142,6 +183,7 @@ class BenchTopics:
         counts = {
             "cycles missed": timing.missed,
             "commands late": commands.late,
+            _AHEAD: commands.ahead,
             "commands with a stamp that is off": commands.off,
             "commands refused": commands.refused - (commands.off if self._strict else 0),
             "commands of a second publisher ignored": self._obeyed.ignored,
@@ -150,7 +192,10 @@ class BenchTopics:
         }
         new = {kind: count - self._reported.get(kind, 0) for kind, count in counts.items()}
         self._reported = {**self._reported, **counts}
+        now_stamped = not new.pop(_AHEAD) and commands.lateness <= WATCHDOG and new.pop("commands late")
+        commands.lateness = 0
         troubles = [f"{count} {kind}" for kind, count in new.items() if count > 0]
+        note = f"; {now_stamped} commands stamped when sent act on arrival" if now_stamped else ""
         values = {
             **timing.values(),
             "lost_cycles": cycle.left_out,
@@ -159,13 +204,14 @@ class BenchTopics:
             "furthest_stamp_s": f"{commands.furthest:+.3f}",
             **cycle.anchor.values(),
         }
-        return NodeHealth(WARN if troubles else OK, ", ".join(troubles) or "running", values)
+        return NodeHealth(WARN if troubles else OK, (", ".join(troubles) or "running") + note, values)
 
     def close(self) -> None:
         """Take the topics away."""
         for publisher in filter(None, (self._states, self._ft, self._deflections)):
             self._node.destroy_publisher(publisher)
         self._node.destroy_subscription(self._wanted.subscription)
+        self.namesakes.close()
 
     def _admit(self, who: object) -> bool:
         return self._obeyed.admit(who, time.monotonic_ns())

@@ -4,7 +4,7 @@ import math
 import threading
 from typing import NamedTuple
 
-from rsea_ros.nodes._anchor import SECOND
+from rsea_ros.nodes._cycle import SECOND
 from rsea_ros.records.record import NONSENSE, is_measured
 
 MILLISECOND = SECOND // 1000
@@ -25,7 +25,8 @@ class CommandQueue:
     """Messages of `torque_command` until they are due. One thread adds, another may take.
 
     Instants are ns on a clock that never jumps and has the system clock's time (Anchor).
-    A command takes effect at its stamp. One whose stamp is past takes effect at once (`late` counts them);
+    A command takes effect at its stamp. One whose stamp is past takes effect at once (`late` counts them,
+    `lateness` is the largest, ns, since it was set to 0); `ahead` counts those that came before their stamp.
     one without a stamp, or further than 0.3 s from now, when it arrives (`unstamped`, of these `off` by
     their stamp). A command that takes effect at once overtakes earlier waiting ones. One that is not finite,
     or beyond NONSENSE times the limit, is dropped (`refused`). 50 ms after the last command the torque is
@@ -45,6 +46,7 @@ class CommandQueue:
         self._newest: int | None = None
         self.stamp, self.torque, self.furthest = 0, 0.0, 0.0
         self.first: float | None = None
+        self.ahead = self.lateness = 0
         self.late = self.unstamped = self.off = self.refused = self.expired = self.dropped = 0
 
     def add(self, stamp: int, torque: float, now: int) -> None:
@@ -63,7 +65,8 @@ class CommandQueue:
                 self.unstamped += 1
                 stamp = now
             elif stamp < self._taken_until:
-                self.late += 1
+                self.late, self.lateness = self.late + 1, max(self.lateness, now - stamp)
+            self.ahead += stamp > now
             self.first = torque if self.first is None else self.first
             if stamp <= now:
                 self._waiting = [w for w in self._waiting if w.when <= now]

@@ -20,13 +20,14 @@ from rsea_ros.hardware.device import State
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.rig_limits import SLEW, derive, derive_rest
 from rsea_ros.nodes._devices import witnesses_of
-from rsea_ros.nodes._parameters import AXIS, DERIVED, JOINT, NodeParameter, stated_limits
+from rsea_ros.nodes._parameters import AXIS, DERIVED, JOINT, NodeParameter, live, stated_limits
 from rsea_ros.nodes._realtime import REALTIME
 
 Values = Mapping[str, Any]
 
 GAINS = ("k_p", "k_d", "k_i", "q_frequency", "k_w")
-TABLE = (
+LIMITS = ("torque_limit", "slew_limit", "error_limit", "error_time", "ft_limit")
+TABLE = live((
     NodeParameter("rig", "paper_high_impedance", "the bench: a name of config/rigs, or a model.yaml"),
     NodeParameter("free", "", f"rig whose ends are the lightest load; empty: rig's, {LIGHTEST} if clamped"),
     NodeParameter("rate", 280.0, "measurements a second", "Hz", 50.0, 1000.0),
@@ -70,7 +71,7 @@ TABLE = (
     NodeParameter("late_time", 1.0, "over which late commands are counted", "s", 0.05, 60.0),
     JOINT,
     *REALTIME,
-)
+), {*GAINS, "torque", "slew", "error", "error_time", "ft"})  # fmt: skip
 
 
 def with_limits(values: Values) -> dict[str, Any]:
@@ -95,10 +96,14 @@ def design_of(values: Values) -> ControllerDesign:
     return design(rig, loads, values["rate"], DesignLimits(*(values[name] for name in names)))
 
 
+def torque_limits(values: Values) -> TorqueLimits:
+    """Return the limits of what is commanded."""
+    return TorqueLimits(values["torque_limit"], values["slew_limit"], values["ramp"])
+
+
 def controller_of(values: Values, designed: ControllerDesign, link: LinkShare) -> TorqueController:
     """Return the controller for the parameters. link: what of the link's motion it feeds forward."""
-    limits = TorqueLimits(values["torque_limit"], values["slew_limit"], values["ramp"])
-    compensate = None if values["compensate"] else ()
+    limits, compensate = torque_limits(values), None if values["compensate"] else ()
     settings = ControllerSettings(compensate, values["preview"], values["prediction"], values["learn"])
     rig, rate = load_rig(values["rig"]), values["rate"]
     return TorqueController(rig, rate, designed.gains, limits=limits, link=link, settings=settings)
@@ -130,12 +135,16 @@ class ControllerLimits:
 
     def __init__(self, values: Mapping[str, Any]) -> None:
         """values: parameters of the controller node."""
-        self._error_limit, self._ft_limit = values["error_limit"], values["ft_limit"]
-        self._longest = max(1, round(values["error_time"] * values["rate"]))
+        self.limit(values)
         self.lateness = Lateness(values["rate"], Tolerance(values["late_share"], values["late_time"]))
         self._off = self._idle = 0
         self._patience = max(1, round(OBEYED * values["rate"]))
         self._witnesses = witnesses_of({**values, **ON_TOPICS})
+
+    def limit(self, values: Mapping[str, Any]) -> None:
+        """Keep other limits from the next sample on."""
+        self._error_limit, self._ft_limit = values["error_limit"], values["ft_limit"]
+        self._longest = max(1, round(values["error_time"] * values["rate"]))
 
     def clear(self) -> None:
         """Restart."""

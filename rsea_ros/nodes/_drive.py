@@ -1,18 +1,15 @@
-"""Driving a device: cycles, and the alarm that ends them."""
+"""Driving a device: cycles."""
 
-import os
-import signal
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from typing import Protocol
 
 from rsea_ros.hardware.device import State
 from rsea_ros.hardware.guarded import GuardedDevice, Shared, cycle
 from rsea_ros.hardware.interlock import DeviceFault
-from rsea_ros.nodes._anchor import SECOND, Anchor
 from rsea_ros.nodes._commands import CommandQueue
-from rsea_ros.processes import ENDING
+from rsea_ros.nodes._cycle import SECOND, Anchor
 
 CLOCK_STEP, RESTARTED = "clock_step", "restarted"
 
@@ -100,33 +97,3 @@ def step(drives: Sequence[DriverCycle], stamp: int, buses: Sequence[Shared] = ()
         by = drives[0].anchor.follow()
         wanted = [drive.wanted_torque(stamp + by, by) for drive in drives]
         return cycle([drive.guarded for drive in drives], wanted, buses)
-
-
-class SignalListener:
-    """Call `react()`, in a thread, at the first signal that ends the process, beside the handlers it has."""
-
-    def __init__(self, react: Callable[[], None]) -> None:
-        self._react = react
-        self._outlet, self._inlet = os.pipe()
-        os.set_blocking(self._inlet, False)
-        self._main = threading.current_thread() is threading.main_thread()  # not permitted to other users
-        if self._main:
-            self._before = signal.set_wakeup_fd(self._inlet, warn_on_full_buffer=False)
-        self._thread = threading.Thread(target=self._listen, daemon=True)
-        self._thread.start()
-
-    def close(self) -> None:
-        """Listen no more."""
-        if self._inlet < 0:
-            return
-        if self._main:
-            signal.set_wakeup_fd(self._before)
-        os.close(self._inlet)
-        self._inlet = -1
-        self._thread.join()
-        os.close(self._outlet)
-
-    def _listen(self) -> None:
-        while numbers := os.read(self._outlet, 64):
-            if set(ENDING).intersection(numbers):
-                self._react()

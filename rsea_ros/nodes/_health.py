@@ -9,7 +9,8 @@ from rclpy.clock_type import ClockType
 from rclpy.node import Node
 
 from msg_adapters.ros import ERROR, OK, WARN, DiagnosticArray, diagnostics_message
-from rsea_ros.nodes._qos import COMMAND
+from rsea_ros.nodes._qos import COMMAND, Incompatible
+from rsea_ros.nodes._realtime import raise_new_threads
 
 __all__ = ["ERROR", "OK", "STEADY", "WARN", "Health", "NodeHealth"]
 
@@ -37,10 +38,15 @@ class Health:
         node.create_timer(1.0, self.publish, clock=STEADY)
 
     def publish(self) -> None:
-        """Publish now. An assessment that fails is an error of its own, and ends no node."""
+        """Publish now, and see to new threads. An assessment that fails is an error, and ends no node."""
+        raise_new_threads()
         name = f"{self._node.get_fully_qualified_name()}{self._part}"
         try:
             report = self._assess()
+            if lines := Incompatible.words(self._node):
+                told = report.summary if report.level != OK else ""
+                words = "; ".join(filter(None, (told, *lines)))
+                report = NodeHealth(max(report.level, WARN), words, report.values)
         except Exception as error:
             text = f"no assessment: {type(error).__name__}: {error}"
             self._node.get_logger().error(text, throttle_duration_sec=10.0)

@@ -16,9 +16,8 @@ from rsea_ros.hardware.guarded import GuardedDevice
 from rsea_ros.hardware.interlock import DeviceFault, event
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.rig_limits import check_travel
-from rsea_ros.nodes._anchor import Anchor
 from rsea_ros.nodes._bench_topics import BenchTopics
-from rsea_ros.nodes._cycle import Cycle
+from rsea_ros.nodes._cycle import Anchor, Cycle
 from rsea_ros.nodes._devices import limits_of, spring_of, witnesses_of
 from rsea_ros.nodes._drive import DriverCycle
 from rsea_ros.nodes._health import ERROR, OK, WARN, Health, NodeHealth
@@ -42,7 +41,7 @@ class DrivenJoint:
     """
 
     def __init__(
-        self, node: Node, jobs: Jobs, part: str, values: Mapping[str, Any], device: Device,
+        self, node: Node, jobs: Jobs, part: str, values: dict[str, Any], device: Device,
         offers: list[Offer],
     ) -> None:  # fmt: skip
         self._node, self._jobs, self.part, self._values = node, jobs, part, values
@@ -53,7 +52,7 @@ class DrivenJoint:
         self.drive: DriverCycle | None = None
         self.topics: BenchTopics | None = None
         self._cycle: Cycle | None = None
-        self._ended = ""
+        self._ended = self._double = ""
         self._reported: tuple[DeviceFault | None, int] = (None, 0)
         self._health = Health(node, self.report, part=part)
         space, after = f"{part}/" if part else "", self._health.publish
@@ -82,6 +81,22 @@ class DrivenJoint:
         )  # fmt: skip
         self.drive = DriverCycle(self.guarded, self.topics, anchor, values["rate"])
 
+    def change(self, values: Mapping[str, Any]) -> None:
+        """Take new values of limits; before the device is open they count from configure on.
+
+        Raises ParameterError for those that cannot be.
+        """
+        before = {name: self._values[name] for name in values}
+        self._values |= values
+        try:
+            if self.drive is None:
+                limits_of(self._values)
+            else:
+                self.guarded.limit([name.removesuffix("_limit") for name in values])
+        except RseaError:
+            self._values |= before
+            raise
+
     def runs_in(self, cycle: Cycle) -> None:
         """Note the cycle, whose times are reported with this joint's health."""
         self._cycle = cycle
@@ -92,6 +107,8 @@ class DrivenJoint:
         zero_first: whether that one must be zero. Raises ParameterError where nothing limits a free end.
         """
         assert self.drive is not None
+        if self._double:
+            raise DeviceError(f"{self._double}: their torques and measurements would mix")
         if not self._values["allow_no_position_limit"]:
             check_travel(self.guarded.guard.limits.position, load_rig(self._values["rig"]))
         with self.drive.deaf():
@@ -102,6 +119,7 @@ class DrivenJoint:
         """Take the topics away; the device is closed already, or not open."""
         if self.topics is not None:
             self.topics.close()
+        self._double = ""
         self._cycle = self.topics = self.drive = None
 
     def publish(self, state: State) -> None:
@@ -164,7 +182,7 @@ class DrivenJoint:
         self._cycle.rest()
         fault, cycles = self.guarded.fault, self.guarded.cycles
         lost = {words: cycles[name] for name, words in LOST.items()} if fault is None else {}
-        report = self.topics.report(self._cycle, lost)
+        report, self._double = self.topics.report(self._cycle, lost), self.topics.namesakes.look()
         values = {
             "active": self.guarded.enabled,
             "fault": fault or "none",
@@ -180,6 +198,9 @@ class DrivenJoint:
             **self.guarded.device.health(),
         }
         told, level = (f"fault {fault}", ERROR) if fault is not None else (self.guarded.contradiction, WARN)
+        if self._double:
+            told, level = "; ".join(filter(None, (self._double, told))), ERROR
+            self._node.get_logger().error(self.with_name(self._double), throttle_duration_sec=10.0)
         if not told:
             return NodeHealth(report.level, report.summary, values)
         besides = "" if report.level == OK else f"; {report.summary}"

@@ -13,6 +13,7 @@ from rclpy.task import Future
 from rsea_ros.errors import ParameterError
 from rsea_ros.nodes._health import STEADY
 from rsea_ros.nodes._parameters import NodeParameter
+from rsea_ros.nodes._realtime import raise_new_threads
 
 JOINTS = NodeParameter(
     "joints", [""], "names of several joints, each with topics and services under its name; [\"\"]: one",
@@ -88,6 +89,7 @@ class Jobs:
         self._threads.add(thread)
         self._tick.reset()
         thread.start()
+        raise_new_threads()
         try:
             return str(await future)
         finally:

@@ -18,8 +18,8 @@ from rsea_ros.control.synthesis import ControllerDesign, DesignLimits
 from rsea_ros.control.uncertainty import lightest, load_range
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.nodes._anchor import Anchor
 from rsea_ros.nodes._commands import CommandQueue
+from rsea_ros.nodes._cycle import Anchor
 from rsea_ros.nodes._mailbox import Mailbox, MessageFields
 from rsea_ros.nodes._qos import COMMAND, MEASUREMENT
 from rsea_ros.records.record import NONSENSE, is_measured

@@ -12,7 +12,7 @@ from rclpy.qos import QoSProfile
 from msg_adapters.cdr import RawReader
 from msg_adapters.ros import message_type
 from rsea_ros.errors import ParameterError
-from rsea_ros.nodes._qos import OVERRIDES
+from rsea_ros.nodes._qos import OVERRIDES, Incompatible
 
 
 class Polled(CallbackGroup):
@@ -55,7 +55,7 @@ class Mailbox:
         self._reader = RawReader(read.msgtype, read.fields, read.joint, read.most)
         self.subscription: Any = node.create_subscription(
             self._kind, topic, lambda message: None, qos, callback_group=Polled(), raw=True,
-            qos_overriding_options=OVERRIDES,
+            qos_overriding_options=OVERRIDES, event_callbacks=Incompatible(node, topic, qos),
         )  # fmt: skip
 
     def take(self, most: int = sys.maxsize) -> Iterator[tuple[int, Sequence[float], int]]:

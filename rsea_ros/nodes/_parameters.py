@@ -1,17 +1,17 @@
 """Parameters of a node: a table with description, unit and range; other values are refused."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 from rclpy.node import Node
 
-from msg_adapters.ros import parameter_descriptor
+from msg_adapters.ros import SetParametersResult, parameter_descriptor
 from msg_adapters.topic_map import AXES
 from rsea_ros.documents.units import plain
 from rsea_ros.documents.wording import did_you_mean
-from rsea_ros.errors import ParameterError
+from rsea_ros.errors import ParameterError, RseaError
 
 Value = bool | int | float | str | list[str]
 
@@ -25,7 +25,7 @@ class NodeParameter:
     """One parameter. Its type is the default's; an integer is accepted for a float.
 
     low, high: inclusive range of a number. choices: allowed texts. whole: of the node, where the others
-    may be given for each of several joints.
+    may be given for each of several joints. live: may change while the node runs.
     """
 
     name: str
@@ -36,6 +36,7 @@ class NodeParameter:
     high: float | None = None
     choices: Sequence[str] = ()
     whole: bool = False
+    live: bool = False
 
     def requirement(self) -> str:
         """Return the requirement on a value, in words."""
@@ -95,14 +96,19 @@ def declare(
     node: Node,
     table: Sequence[NodeParameter],
     more: Callable[[Mapping[str, Any]], Sequence[NodeParameter]] = lambda given: (),
+    foreign: Collection[str] = (),
 ) -> dict[str, Any]:
     """Declare a table on a node and return the values. more: further parameters, from the given ones.
 
+    foreign: names that are given to all nodes of the process, and are none of this one's.
     The node was made with `automatically_declare_parameters_from_overrides`, so it has the given values.
     Raises ParameterError for a wrong value, and for a name that is not in the table.
     """
     given = {name: parameter.value for name, parameter in node.get_parameters_by_prefix("").items()}
     table = [*table, *more(given)]
+    for name in given.keys() & (set(foreign) - {p.name for p in table}):
+        node.undeclare_parameter(name)
+        del given[name]
     _refuse_unknown(given, table)
     values = {p.name: p.check(given.get(p.name, p.default)) for p in table}
     for parameter in table:
@@ -127,7 +133,37 @@ def _descriptor(parameter: NodeParameter) -> Any:
     if low is not None and high is not None:
         bounds = (int(low), int(high)) if isinstance(parameter.default, int) else (float(low), float(high))
     about = ", ".join(filter(None, (parameter.description, plain(parameter.unit))))
-    return parameter_descriptor(about, f"expected {parameter.requirement()}", bounds)
+    expected = f"expected {parameter.requirement()}"
+    return parameter_descriptor(about, expected, bounds, fixed=not parameter.live)
+
+
+def live(table: Sequence[NodeParameter], names: Collection[str]) -> tuple[NodeParameter, ...]:
+    """Return a table in which parameters of these names, or limits of these quantities, may change."""
+    return tuple(replace(p, live=p.name.removesuffix("_limit") in names) for p in table)
+
+
+def let_change(
+    node: Node, table: Sequence[NodeParameter], change: Callable[[dict[str, Any]], None]
+) -> None:
+    """Have live parameters of a table, also those of its joints, changed: by name, all that are set at once.
+
+    The text of an RseaError that `change` raises is the reason why they stay as they are.
+    """
+    known = {p.name: p for p in table if p.live}
+
+    def take(parameters: Sequence[Any]) -> SetParametersResult:
+        asked = {p.name: (known.get(p.name.rpartition(".")[2]), p.value) for p in parameters}
+        try:
+            values = {name: p.check(value) for name, (p, value) in asked.items() if p is not None}
+            if values:
+                change(values)
+        except RseaError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        for name, value in values.items():
+            node.get_logger().info(f"parameter {name} = {value} from now on")
+        return SetParametersResult(successful=True)
+
+    node.add_on_set_parameters_callback(take)
 
 
 def usage(name: str, table: Sequence[NodeParameter]) -> str:

@@ -13,17 +13,15 @@ import tempfile
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
-from unittest.mock import patch
 from xml.etree import ElementTree as XML
 
 import rclpy
-from rclpy.node import Node
+from rclpy.executors import SingleThreadedExecutor
 
 from msg_adapters import BagWriter
 from rsea_ros.model.rig import Sensor
 from rsea_ros.model.rig_file import load_rig, save_rig
-from rsea_ros.nodes._parameters import declare
-from rsea_ros.nodes._run import NAMESPACE
+from rsea_ros.nodes._run import NAMESPACE, Member
 from rsea_ros.nodes.record import TOPICS
 
 NODES = (
@@ -72,6 +70,10 @@ def policies(joints: Sequence[str] = ()) -> str:
             os.chdir(before)
     heard = {name for each in nodes.values() for name in each["topics", "publish"]}
     served = {name for each in nodes.values() for name in each["services", "reply"]}
+    for (_, name), each in nodes.items():
+        if name == "record":
+            asked = {s for s in served if s.endswith(("/list_parameters", "/get_parameters"))}
+            each["services", "request"] |= asked
     person: Interfaces = {("topics", "subscribe"): heard, ("services", "request"): served}
     return document({**nodes, (NAMESPACE, OPERATOR): person})
 
@@ -93,21 +95,15 @@ def _joints(joints: Sequence[str]) -> Profiles:
 
 def interfaces(name: str, **parameters: object) -> Interfaces:
     """Make a node and return the full names of its topics and services."""
-    module = importlib.import_module(f"rsea_ros.nodes.{name}")
-    with patch.object(module, "run_node") as run:
-        module.main()
-    (_, table, make), options = run.call_args
+    component = importlib.import_module(f"rsea_ros.nodes.{name}").NODE
     given = {**PARAMETERS.get(name, {}), **parameters}
     words = [w for key, value in given.items() for w in ("-p", f"{key}:={value}")]
     with rclpy.init(args=["--ros-args", *words]):
-        kind = options.get("kind", Node)
-        node = kind(name, namespace=NAMESPACE, automatically_declare_parameters_from_overrides=True)
-        program = make(node, declare(node, table))
+        member = Member(component, SingleThreadedExecutor())
         try:
-            return _ask(node, name)
+            return _ask(member.node, name)
         finally:
-            program.close()
-            node.destroy_node()
+            member.close()
 
 
 def document(profiles: Profiles) -> str:

@@ -20,6 +20,8 @@ SWITCH_INTERVAL = 1e-5
 """s after which a thread of Python must let another one in."""
 PROCESSORS = os.sched_getaffinity(0)
 """That this process may run on."""
+_timed: dict[int, int] = {}
+"""Priority of each thread that keeps time, by its number; none where none has one."""
 REALTIME = (
     NodeParameter(
         "realtime_priority", 0, "of the thread that keeps time, SCHED_FIFO; 0: as any process", "", 0,
@@ -74,6 +76,7 @@ def keep_time(node: Node, worker: Worker, values: Mapping[str, Any]) -> None:
     sys.setswitchinterval(SWITCH_INTERVAL)  # Python's own, 5 ms, is longer than a cycle, and so is
     gc.collect()  # a garbage collection over everything that a node has loaded
     gc.freeze()
+    ctypes.CDLL(None).malloc_trim(0)  # what imports and designs have left
     worker.start()
     processor = values["cpu_affinity"]
     if processor in PROCESSORS:
@@ -94,18 +97,30 @@ def raise_priority(first: threading.Thread, priority: int) -> None:
     """Let a thread run at SCHED_FIFO `priority`, and every other thread of this process one below it.
 
     They share the locks of the interpreter and of the middleware, through which messages arrive:
-    one that holds a lock without the processor delays all. Children begin at normal priority. Raises
-    ParameterError where the system does not permit it.
+    one that holds a lock without the processor delays all, and those that wait for the interpreter's look for
+    it every SWITCH_INTERVAL: two of them took 163 % of a core, and with it the processor of the one that they
+    waited for. Children begin at normal priority, threads too until `raise_new_threads`.
+    Raises ParameterError where the system does not permit it.
     """
-    for thread in _threads():
-        level = priority if thread == first.native_id else max(1, priority - 1)
-        try:
-            _schedule(thread, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, level)
-        except PermissionError as error:
-            raise ParameterError(
-                f"parameter realtime_priority = {priority}: {error.strerror}, expected a user who may"
-                " (rtprio in /etc/security/limits.d, docs/hardware.md)"
-            ) from None
+    assert first.native_id is not None
+    _timed[first.native_id] = priority
+    try:
+        raise_new_threads()
+    except PermissionError as error:
+        _timed.clear()
+        raise ParameterError(
+            f"parameter realtime_priority = {priority}: {error.strerror}, expected a user who may"
+            " (rtprio in /etc/security/limits.d, docs/hardware.md)"
+        ) from None
+
+
+def raise_new_threads() -> None:
+    """Give threads that have begun since then their priority, while one of this process keeps time at one."""
+    for thread in _threads() if _timed else ():
+        level = _timed.get(thread, max(1, max(_timed.values()) - 1))
+        with suppress(ProcessLookupError):  # it has ended meanwhile
+            if os.sched_getparam(thread).sched_priority != level:
+                _schedule(thread, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, level)
 
 
 def exact_timers() -> None:
@@ -119,6 +134,7 @@ def stop_keeping_time(values: Mapping[str, Any]) -> None:
     if values["cpu_affinity"] >= 0:
         _bind(PROCESSORS)
     if values["realtime_priority"]:
+        _timed.clear()
         for thread in _threads():
             _schedule(thread, os.SCHED_OTHER, 0)
 

@@ -5,16 +5,22 @@ Fast DDS gives messages to listeners on the same machine through shared memory. 
 interpreter meanwhile: the cycle stands still under torque.
 """
 
+import faulthandler
+import math
 import os
 import signal
 import sys
+import threading
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from types import FrameType
 from typing import Any, Protocol
 
 import rclpy
-from rclpy.executors import SingleThreadedExecutor
+from rclpy.executors import Executor, SingleThreadedExecutor
 from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
@@ -72,42 +78,116 @@ class Program(Protocol):
         """Clean up on every way out: torque zero, threads joined, files closed."""
 
 
-def run_node(
-    name: str,
-    table: Sequence[NodeParameter],
-    make: Callable[[Any, dict[str, Any]], Program],
-    *,
-    kind: type[Node] = Node,
-    endless: bool = True,
-    more: Callable[[Mapping[str, Any]], Sequence[NodeParameter]] = lambda given: (),
-    waits_for_nobody: bool = False,
-) -> int:
-    """Run one node in this process and return the exit status.
+@dataclass(frozen=True)
+class Component:
+    """A kind of node: its usual name, its parameters, and what makes its program from their values.
 
     endless: a signal of STOPPING is the regular end; any other end by a signal is an interruption (status
     128 plus its number).
-    more: parameters beside those of the table, from the given ones. waits_for_nobody: see _sockets.py.
-    An error that the user can correct is one line in the log and status 2.
+    more: parameters beside those of the table, from the given ones. waits_for_nobody: see publish_by_sockets.
+    patience: s from a signal to an end by force, of a node that leaves nothing undone; told is where it was.
     """
-    arguments = remove_ros_args(sys.argv)[1:]
+
+    name: str
+    table: Sequence[NodeParameter]
+    make: Callable[[Any, dict[str, Any]], Program]
+    kind: type[Node] = Node
+    endless: bool = True
+    more: Callable[[Mapping[str, Any]], Sequence[NodeParameter]] = lambda given: ()
+    waits_for_nobody: bool = False
+    patience: float = math.inf
+
+    def run(self) -> int:
+        """Run one node in this process and return the exit status."""
+        return run_nodes([self], remove_ros_args(sys.argv)[1:])
+
+
+class Member:
+    """A node of the package in an executor, until `close`: torque zero, threads joined, files closed.
+
+    others: kinds of nodes in the same process, whose parameters are given to all. options: of rclpy's Node.
+    """
+
+    def __init__(
+        self, component: Component, executor: Executor, *, name: str = "", namespace: str = NAMESPACE,
+        others: Sequence[Component] = (), **options: Any,
+    ) -> None:  # fmt: skip
+        self._executor, options = executor, {"namespace": namespace, **options}
+        options["automatically_declare_parameters_from_overrides"] = True
+        try:
+            self.node = component.kind(name or component.name, **options)
+        except RuntimeError as error:  # of middleware that cannot, as with security that it does not have
+            raise RseaError(str(error).split(", at /")[0]) from None
+        known = {p.name for other in others for p in other.table}
+        self.program = component.make(self.node, declare(self.node, component.table, component.more, known))
+        executor.add_node(self.node)
+
+    def close(self) -> None:
+        """End it."""
+        self.program.close()
+        self._executor.remove_node(self.node)
+        self.node.destroy_node()
+
+
+def run_nodes(components: Sequence[Component], arguments: Sequence[str] = ()) -> int:
+    """Run nodes in this process and one executor and return the exit status.
+
+    An error that the user can correct is one line in the log and status 2; what ends one node ends all.
+    """
     if "--help" in arguments or "-h" in arguments:
-        sys.stdout.write(usage(name, table))
+        sys.stdout.write("\n".join(usage(each.name, each.table) for each in components))
         return SUCCESS
-    stop = _Stop()
+    stop, log = _Stop(), get_logger(components[0].name)
+    patience, listener = max(each.patience for each in components), None
     try:
-        _initialise(arguments, waits_for_nobody=waits_for_nobody)
+        if math.isfinite(patience):
+            listener = SignalListener(partial(faulthandler.dump_traceback_later, patience, exit=True))
+        _initialise(arguments, waits_for_nobody=any(each.waits_for_nobody for each in components))
         if effects := os.environ.get("RSEA_EFFECTS"):
-            get_logger(name).warning(f"RSEA_EFFECTS={printable(effects)}: code from there runs in this node")
-        node = _make(kind, name)
-        done = _work(node, make(node, declare(node, table, more)), stop)
+            log.warning(f"RSEA_EFFECTS={printable(effects)}: code from there runs in this node")
+        done = _work(components, stop)
+        endless = all(each.endless for each in components)
         return SUCCESS if done or (endless and stop.status - Stopped.BASE in STOPPING) else stop.status
     except Stopped as stopped:
         return stopped.status
     except (RseaError, OSError) as error:
-        get_logger(name).fatal(printable(" ".join(str(error).split())))
+        log.fatal(printable(" ".join(str(error).split())))
         return BAD_INPUT
     finally:
         rclpy.try_shutdown()
+        if listener is not None:
+            listener.close()
+            faulthandler.cancel_dump_traceback_later()
+
+
+class SignalListener:
+    """Call `react()`, in a thread, at the first signal that ends the process, beside the handlers it has."""
+
+    def __init__(self, react: Callable[[], None]) -> None:
+        self._react = react
+        self._outlet, self._inlet = os.pipe()
+        os.set_blocking(self._inlet, False)
+        self._main = threading.current_thread() is threading.main_thread()  # not permitted to other users
+        if self._main:
+            self._before = signal.set_wakeup_fd(self._inlet, warn_on_full_buffer=False)
+        self._thread = threading.Thread(target=self._listen, daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """Listen no more."""
+        if self._inlet < 0:
+            return
+        if self._main:
+            signal.set_wakeup_fd(self._before)
+        os.close(self._inlet)
+        self._inlet = -1
+        self._thread.join()
+        os.close(self._outlet)
+
+    def _listen(self) -> None:
+        while numbers := os.read(self._outlet, 64):
+            if set(ENDING).intersection(numbers):
+                self._react()
 
 
 class _Stop:
@@ -154,30 +234,29 @@ def _initialise(arguments: Sequence[str], *, waits_for_nobody: bool = False) -> 
         raise ParameterError(f"ROS arguments: {str(error).split(', at /')[0]}") from None
 
 
-def _make(kind: type[Node], name: str) -> Node:
-    """Make the node. Raises RseaError where the middleware cannot, as with security that it does not have."""
-    try:
-        return kind(name, namespace=NAMESPACE, automatically_declare_parameters_from_overrides=True)
-    except RuntimeError as error:
-        raise RseaError(str(error).split(", at /")[0]) from None
-
-
-def _work(node: Node, program: Program, stop: _Stop) -> bool:
-    """Spin until the program has finished or a signal requests a stop; return whether it had finished."""
-    executor = SingleThreadedExecutor()
-    executor.add_node(node)
-    pulse = Pulse(node, TICK)
-    try:
-        done = False
+def _work(components: Sequence[Component], stop: _Stop) -> bool:
+    """Spin until a program has finished or a signal requests a stop; return whether one had finished."""
+    executor, members = SingleThreadedExecutor(), list[Member]()
+    with ExitStack() as kept:
+        kept.callback(executor.shutdown)
+        kept.callback((pulse := Pulse(rclpy.get_default_context(), TICK)).close)
+        kept.callback(_close, members)
+        for each in reversed(components):  # which compute for seconds, before the first one moves a machine
+            members.insert(0, Member(each, executor, others=components))
+        nodes, done = [member.node for member in members], False
         while not (stop.asked or done):
-            ready = anything_to_do(node, executor, pulse)
-            done = program.is_finished()
+            ready = anything_to_do(nodes, executor, pulse)
+            done = max(member.program.is_finished() for member in members)
             if ready and not done:
                 executor.spin_once(timeout_sec=0.0)
         stop.interrupt()
-        program.conclude()
+        for member in members:
+            member.program.conclude()
         return done
-    finally:
-        program.close()
-        pulse.close()
-        executor.shutdown()
+
+
+def _close(members: Sequence[Member]) -> None:
+    """Close each whatever another one raises, the first one first: it may move a machine."""
+    with ExitStack() as kept:
+        for member in reversed(members):
+            kept.callback(member.close)

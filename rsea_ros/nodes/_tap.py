@@ -6,7 +6,6 @@ from collections.abc import Callable, Collection
 from functools import partial
 from typing import Any
 
-from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
@@ -15,7 +14,7 @@ from msg_adapters.contents import Contents
 from msg_adapters.reading import record_from
 from msg_adapters.ros import message_type
 from msg_adapters.topic_map import ROLES, TYPES, TopicMap
-from rsea_ros.nodes._qos import RECORD, RECORD_RELIABLE
+from rsea_ros.nodes._qos import RECORD, RECORD_RELIABLE, Incompatible
 from rsea_ros.records.record import Record
 
 
@@ -32,7 +31,7 @@ class Tap:
         self._store = store
         self._subscription: Subscription[Any] = node.create_subscription(
             kind, topic, self._take, qos, raw=True,
-            event_callbacks=SubscriptionEventCallbacks(message_lost=self._on_lost),
+            event_callbacks=Incompatible(node, topic, qos, message_lost=self._on_lost),
         )  # fmt: skip
 
     @property

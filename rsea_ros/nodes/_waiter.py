@@ -14,8 +14,10 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import ExitStack
+from itertools import chain
 from typing import Any, Literal, get_args
 
+from rclpy.context import Context
 from rclpy.executors import Executor
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
@@ -32,11 +34,10 @@ KINDS: tuple[Kind, ...] = get_args(Kind)
 class Pulse:
     """Triggers `guard` every period (s) until it is closed. Only one wait set may hold it."""
 
-    def __init__(self, node: Node, period: float) -> None:
-        context = node.context.handle
-        assert context is not None
-        with context:
-            self.guard = rclpy_implementation.GuardCondition(context)
+    def __init__(self, context: Context, period: float) -> None:
+        assert context.handle is not None
+        with context.handle:
+            self.guard = rclpy_implementation.GuardCondition(context.handle)
         self._period = period
         self._is_over = False
         self._thread = threading.Thread(target=self._beat, daemon=True)
@@ -70,7 +71,7 @@ class Waiter(Worker):
 
     def run(self) -> None:
         """Wait and work."""
-        pulse = Pulse(self._node, self._pause)
+        pulse = Pulse(self._node.context, self._pause)
         try:
             context, handles = self._node.context.handle, [s.handle for s in self._subscriptions]
             assert context is not None
@@ -89,18 +90,22 @@ class Waiter(Worker):
             pulse.close()
 
 
-def anything_to_do(node: Node, executor: Executor, pulse: Pulse) -> bool:
-    """Wait until an entity of an executor's node is ready, or for a pulse; return whether one is ready.
+def anything_to_do(nodes: Sequence[Node], executor: Executor, pulse: Pulse) -> bool:
+    """Wait until an entity of an executor's nodes is ready, or for a pulse; return whether one is ready.
 
     Events of publishers and subscriptions wake nobody; the executor sees to them when it runs next.
     """
-    assert node.context.handle is not None
+    context = nodes[0].context.handle
+    assert context is not None
     held: list[Any] = []
     try:
-        handles = {kind: _hold(held, executor, getattr(node, f"{kind}s")) for kind in KINDS}
+        handles = {
+            kind: _hold(held, executor, chain.from_iterable(getattr(node, f"{kind}s") for node in nodes))
+            for kind in KINDS
+        }
         subscriptions, timers, clients, services = map(len, handles.values())
         counts = (subscriptions, 1, timers, clients, services, 0)
-        waits = rclpy_implementation.WaitSet(*counts, node.context.handle)
+        waits = rclpy_implementation.WaitSet(*counts, context)
         waits.clear_entities()
         waits.add_guard_condition(pulse.guard)
         for kind, found in handles.items():

@@ -19,15 +19,17 @@ from msg_adapters.topic_map import TYPES
 from rsea_ros.control.controller import Measurement
 from rsea_ros.control.grid import Grid
 from rsea_ros.control.polarity import Polarity
+from rsea_ros.errors import ParameterError
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.nodes._anchor import Anchor
+from rsea_ros.nodes import _control
 from rsea_ros.nodes._control import TABLE, ControllerLimits, controller_of, design_of, summary, with_limits
-from rsea_ros.nodes._cycle import SECOND
+from rsea_ros.nodes._cycle import SECOND, Anchor
 from rsea_ros.nodes._health import ERROR, OK, WARN, Health, NodeHealth
 from rsea_ros.nodes._link import Measurements, link_of, link_values, link_words
+from rsea_ros.nodes._parameters import let_change
 from rsea_ros.nodes._qos import COMMAND, await_arrival
 from rsea_ros.nodes._realtime import keep_time
-from rsea_ros.nodes._run import run_node
+from rsea_ros.nodes._run import Component
 from rsea_ros.nodes._waiter import Waiter
 
 WATCH = 0.005
@@ -45,11 +47,11 @@ class ControllerNode:
     """
 
     def __init__(self, node: Node, values: dict[str, Any]) -> None:
-        values = with_limits(values)
+        self._stated, values = values, with_limits(values)
         self._node, self._values = node, values
         self._design = design_of(values)
         self._link = link_of(values, self._design)
-        self._controller = controller_of(values, self._design, self._link.share)
+        self._controller = self._newest = controller_of(values, self._design, self._link.share)
         self._period = SECOND / values["rate"]
         self._inputs = Measurements(
             node, values["axis"], self._period, values["joint"],
@@ -75,6 +77,30 @@ class ControllerNode:
             node.get_logger().info(line)
         self._waiter = Waiter(node, self._inputs.subscriptions, self._work, WATCH)
         keep_time(node, self._waiter, values)
+        let_change(node, TABLE, self._change)
+
+    def _change(self, new: dict[str, Any]) -> None:
+        """Take new limits, raised ones only without torque, and gains, which begin softly.
+
+        Raises ParameterError for gains that are unstable with a load, or a limit raised under torque.
+        """
+        stated = {**self._stated, **new}
+        derived = with_limits(stated)
+        values = {**self._values, **{name: derived[name] for name in new}}
+        design, newest, link = self._design, self._newest, self._link
+        if not new.keys().isdisjoint(_control.GAINS):
+            design = design_of(values)
+            share = link.share if link.encoder is None else link_of(values, design).share
+            link, newest = link._replace(share=share), controller_of(values, design, share)
+        with self._lock:
+            raised = [name for name in _control.LIMITS if values[name] > self._values[name]]
+            if raised and self._wished and not self._fault:
+                raise ParameterError(f"{raised[0]} is raised under torque, expected clear_fault first")
+            for controller in (self._controller, newest):
+                controller.limit(_control.torque_limits(values))
+            self._limits.limit(values)
+            self._stated, self._values = stated, values
+            self._design, self._newest, self._link = design, newest, link
 
     def _work(self) -> None:
         """Command for each measurement that came, and see to their absence."""
@@ -116,7 +142,8 @@ class ControllerNode:
         desired = self._desired.torque if self._polarity.proven else reading.ft
         if fault := falsified or self._polarity.contradiction or self._limits.fault(reading.ft, desired):
             return self._latch(fault)
-        self._torque = torque
+        most = self._values["torque_limit"]  # pulses, too, keep one that was lowered
+        self._torque = min(max(torque, -most), most)
         self._publish(self._grid.next)
         self._last = stamp
         self._steps, self._missed = self._steps + 1, self._missed + missed
@@ -137,15 +164,13 @@ class ControllerNode:
             torque = self._polarity.probe(reading, desired, missed, acts=acts)
             if torque is not None:
                 return torque
-            self._controller.start(reading, self._desired.torque)
-            missed = 0
+            missed = self._start(reading)
         elif self._polarity.watch(reading, missed):
             return 0.0
         elif self._polarity.doubted:
             reading = replace(reading, ft=math.nan)  # a lost sample
-        elif self._held != before:
-            self._controller.start(reading, self._desired.torque)
-            missed = 0
+        elif self._held != before or self._newest is not self._controller:
+            missed = self._start(reading)
         torque = self._controller.step(
             reading,
             self._desired.torque,
@@ -156,6 +181,12 @@ class ControllerNode:
         )
         self._polarity.sent(torque)
         return torque
+
+    def _start(self, reading: Measurement) -> int:
+        """Begin softly, with the newest gains; return how many samples were missed then."""
+        self._controller = self._newest
+        self._controller.start(reading, self._desired.torque)
+        return 0
 
     def _take_desired(self) -> float:
         """Take the desired torque nearest to this sample; return by how many samples it is for later.
@@ -272,10 +303,8 @@ class ControllerNode:
             yield f"without the link's motion: {encoder.trouble or 'deflection was lost for a moment'}"
 
 
-def main() -> int:
-    """Run the node."""
-    return run_node("controller", TABLE, ControllerNode, waits_for_nobody=True)
-
+NODE = Component("controller", TABLE, ControllerNode, waits_for_nobody=True)
+main = NODE.run
 
 if __name__ == "__main__":
     sys.exit(main())

@@ -18,18 +18,18 @@ from rclpy.lifecycle import LifecycleNode, LifecycleState, ManagedEntity, Transi
 
 from rsea_ros.documents.wording import printable
 from rsea_ros.errors import DeviceError, ParameterError, RseaError
+from rsea_ros.hardware.limits import CHANGEABLE
 from rsea_ros.hardware.outside import EXTRA_PATH, options_of
-from rsea_ros.nodes._anchor import Anchor
 from rsea_ros.nodes._bench_topics import COMMAND_TYPE, NAMES, SPRING_FRAME, Combined
-from rsea_ros.nodes._cycle import Cycle
+from rsea_ros.nodes._cycle import Anchor, Cycle
 from rsea_ros.nodes._device_parameters import ENCODER, LIMITS, MOTOR, SAFETY, SENSOR, devices_of
 from rsea_ros.nodes._devices import DEVICES
-from rsea_ros.nodes._drive import SignalListener, step
+from rsea_ros.nodes._drive import step
 from rsea_ros.nodes._joint import DrivenJoint, Offer, stop_of
 from rsea_ros.nodes._joints import JOINTS, Jobs, joint_table, joint_values
-from rsea_ros.nodes._parameters import NodeParameter
+from rsea_ros.nodes._parameters import NodeParameter, let_change, live
 from rsea_ros.nodes._realtime import REALTIME, keep_time, stop_keeping_time
-from rsea_ros.nodes._run import run_node
+from rsea_ros.nodes._run import Component, SignalListener
 
 TABLE = (
     NodeParameter("device", "simulated", f"what to drive: {', '.join(DEVICES)}, or one of RSEA_DEVICES"),
@@ -46,7 +46,7 @@ TABLE = (
     *MOTOR,
     *ENCODER,
     *SENSOR,
-    *LIMITS,
+    *live(LIMITS, CHANGEABLE),
     *NAMES,
     SPRING_FRAME,
     COMMAND_TYPE,
@@ -62,7 +62,7 @@ class DriverNode(ManagedEntity):
         self._node, self._values = node, values
         if node.get_parameter("use_sim_time").value:
             raise ParameterError("parameter use_sim_time = true, expected false: the device keeps real time")
-        named = [
+        self._named = named = [
             (name, joint | {"device_options": options_of(joint["device_options"])})
             for name, joint in joint_values(values)
         ]
@@ -86,6 +86,8 @@ class DriverNode(ManagedEntity):
         self._cycle: Cycle | None = None
         self._combined: Combined | None = None
         node.add_managed_entity(self)
+        let_change(node, TABLE, self._change)
+        self._changed = False
         self._zero_first = values["autostart"] and not values["resume"]
         if values["autostart"] and node.trigger_configure() == TransitionCallbackReturn.SUCCESS:
             node.trigger_activate()
@@ -96,6 +98,7 @@ class DriverNode(ManagedEntity):
         anchor = Anchor()
         for joint in self.joints:
             try:
+                self._renew_devices()
                 joint.open(anchor)
             except (RseaError, OSError) as error:
                 joint.fail(error)
@@ -109,6 +112,24 @@ class DriverNode(ManagedEntity):
             joint.runs_in(self._cycle)
         keep_time(self._node, self._cycle, self._values)
         return TransitionCallbackReturn.SUCCESS
+
+    def _renew_devices(self) -> None:
+        """Make the devices of changed limits, which a device checks when it is opened."""
+        if self._changed:
+            devices, self._buses = devices_of([joint for _, joint in self._named], DEVICES)
+            for joint, device in zip(self.joints, devices, strict=True):
+                joint.guarded.device = device
+            self._changed = False
+
+    def _change(self, values: dict[str, Any]) -> None:
+        """Take new limits of one joint: lower ones act in the next cycle, and none is raised under torque."""
+        parts = {name.rpartition(".")[0] for name in values}
+        joints = [joint for joint in self.joints if {joint.part} == parts]
+        if not joints:
+            names = ", ".join(joint.part for joint in self.joints)
+            raise ParameterError(f"{', '.join(values)}: expected limits of one joint at once, of {names}")
+        joints[0].change({name.rpartition(".")[2]: value for name, value in values.items()})
+        self._changed = self._changed or self._cycle is None
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Switch the torque on and let commands through, from the next one on; not with a fault latched."""
@@ -234,13 +255,11 @@ class DriverNode(ManagedEntity):
         return ", ".join(done)
 
 
-def main() -> int:
-    """Run the node."""
-    return run_node(
-        "driver", TABLE, DriverNode, kind=LifecycleNode, more=lambda given: joint_table(TABLE, given),
-        waits_for_nobody=True,
-    )  # fmt: skip
-
+NODE = Component(
+    "driver", TABLE, DriverNode, kind=LifecycleNode, more=lambda given: joint_table(TABLE, given),
+    waits_for_nobody=True,
+)  # fmt: skip
+main = NODE.run
 
 if __name__ == "__main__":
     sys.exit(main())

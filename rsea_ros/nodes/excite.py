@@ -22,7 +22,7 @@ from rsea_ros.nodes._health import OK, STEADY, WARN, Health, NodeHealth
 from rsea_ros.nodes._parameters import DERIVED, JOINT, NodeParameter, stated_limits
 from rsea_ros.nodes._player import Player
 from rsea_ros.nodes._qos import COMMAND, MEASUREMENT, publishers_of
-from rsea_ros.nodes._run import Program, run_node
+from rsea_ros.nodes._run import Component, Program
 from rsea_ros.records.record import FloatArray
 
 PATIENCE = 1.5
@@ -166,10 +166,8 @@ def plan(values: dict[str, Any]) -> tuple[FloatArray, float]:
     return command, values["rate"]
 
 
-def main() -> int:
-    """Run the node."""
-    return run_node("excite", TABLE, ExciteNode, endless=False)
-
+NODE = Component("excite", TABLE, ExciteNode, endless=False)
+main = NODE.run
 
 if __name__ == "__main__":
     sys.exit(main())

@@ -26,7 +26,7 @@ from rsea_ros.nodes._health import OK, STEADY, WARN, Health, NodeHealth
 from rsea_ros.nodes._parameters import AXIS, JOINT, NodeParameter
 from rsea_ros.nodes._player import BenchEars, LiveRun, Player
 from rsea_ros.nodes._qos import COMMAND
-from rsea_ros.nodes._run import run_node
+from rsea_ros.nodes._run import Component
 from rsea_ros.outputs.files import Destination, unused_path
 from rsea_ros.records.record import Record
 from rsea_ros.report.diagnosis.page import write_diagnosis
@@ -238,10 +238,8 @@ def _end(step: str, share: float) -> None:
     raise DeviceError("the node is closing")
 
 
-def main() -> int:
-    """Run the node."""
-    return run_node("experiment", TABLE, ExperimentNode, endless=False)
-
+NODE = Component("experiment", TABLE, ExperimentNode, endless=False)
+main = NODE.run
 
 if __name__ == "__main__":
     sys.exit(main())

@@ -25,9 +25,9 @@ from rsea_ros.nodes._commands import WATCHDOG
 from rsea_ros.nodes._cycle import SECOND
 from rsea_ros.nodes._health import OK, STEADY, WARN, Health, NodeHealth
 from rsea_ros.nodes._joint_inputs import Events, HealthInputs, noise_from
-from rsea_ros.nodes._parameters import AXIS, JOINT, NodeParameter
+from rsea_ros.nodes._parameters import AXIS, JOINT, NodeParameter, let_change, live
 from rsea_ros.nodes._qos import COMMAND
-from rsea_ros.nodes._run import NAMESPACE, Program, run_node
+from rsea_ros.nodes._run import NAMESPACE, Component, Program
 from rsea_ros.outputs.files import unused_path
 
 SEVERE = ("RSEA_SENSOR_FROZEN", "RSEA_SENSOR_MISSING")
@@ -184,7 +184,7 @@ def _write(path: Path, messages: Sequence[Message], since: int) -> Path:
     return path
 
 
-TABLE = (
+TABLE = live((
     NodeParameter(
         "rig", "paper_high_impedance", "the joint as it was: a name of config/rigs, or the last model.yaml"
     ),
@@ -203,7 +203,7 @@ TABLE = (
     NodeParameter("memory", 200.0, "that this may take at most", "MB", 1.0, 4000.0),
     NodeParameter("after", 30.0, "from an alarm to the end of its bag", "s", 0.0, 600.0),
     NodeParameter("bags", 10, "that the folder may hold; beyond it none is written", "", 0, 10000),
-)
+), {"false_alarms", "every"})  # fmt: skip
 TICK = 0.25
 """s between two looks at what has come: a wake-up for each sample would cost more than the work."""
 KINDNESS = 10
@@ -217,10 +217,8 @@ class HealthNode(Program):
 
     def __init__(self, node: Node, values: dict[str, Any]) -> None:
         self._node, self._rig_name, self._axis = node, values["rig"], values["axis"]
-        rig = load_rig(values["rig"])
-        settings = WatchSettings(
-            rate=values["false_alarms"], every=values["every"], learn=values["learn"], hold=WATCHDOG / SECOND
-        )
+        self._values, rig = values, load_rig(values["rig"])
+        settings = self._settings()
         self._monitor = Monitor(rig, noise_from(rig, values["identification"]), settings)
         ring = Ring(min(values["keep"], 3600.0), values["memory"])
         self._keeper = Keeper(ring, Path(values["out"]), values["bags"], values["after"])
@@ -234,6 +232,17 @@ class HealthNode(Program):
         self._statuses = FindingsPublisher(node, values["joint"], self._monitor.findings, self._inputs.stamp)
         self._health = Health(node, self._report, values["joint"])
         node.get_logger().info(f"rig {rig.name}: at most {settings.rate:g} false alarms an hour")
+
+        let_change(node, TABLE, self._change)
+
+    def _settings(self) -> WatchSettings:
+        rate, every, learn = (self._values[name] for name in ("false_alarms", "every", "learn"))
+        return WatchSettings(rate=rate, every=every, learn=learn, hold=WATCHDOG / SECOND)
+
+    def _change(self, values: dict[str, Any]) -> None:
+        """Watch with other thresholds; what has been learned stays."""
+        self._values |= values
+        self._monitor.watch(self._settings())
 
     def _work(self) -> None:
         events = self._inputs.take()
@@ -287,9 +296,9 @@ class HealthNode(Program):
         if self._keeper.trouble:
             troubles.append(self._keeper.trouble)
         usual = "learning how the signals scatter" if monitor.learning else "as the model says"
-        return NodeHealth(WARN if troubles else OK, "; ".join(troubles) or usual, self._values())
+        return NodeHealth(WARN if troubles else OK, "; ".join(troubles) or usual, self._told())
 
-    def _values(self) -> dict[str, object]:
+    def _told(self) -> dict[str, object]:
         monitor, inputs = self._monitor, self._inputs
         values: dict[str, object] = {}
         for e in monitor.estimates():
@@ -309,10 +318,8 @@ class HealthNode(Program):
         self._keeper.close()
 
 
-def main() -> int:
-    """Run the node."""
-    return run_node("health", TABLE, HealthNode)
-
+NODE = Component("health", TABLE, HealthNode)
+main = NODE.run
 
 if __name__ == "__main__":
     sys.exit(main())

@@ -27,7 +27,7 @@ from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.nodes._health import OK, WARN, Health, NodeHealth
 from rsea_ros.nodes._parameters import AXIS, NodeParameter
-from rsea_ros.nodes._run import run_node
+from rsea_ros.nodes._run import Component
 from rsea_ros.nodes._tap import Ears
 from rsea_ros.outputs.files import Destination, check_free, unused_path
 from rsea_ros.records.record import Record
@@ -258,10 +258,8 @@ def report_of(result: Identification, report: Path) -> NodeHealth:
     return NodeHealth(level, verdict_sentence(result), {**values, "report": report})
 
 
-def main() -> int:
-    """Run the node."""
-    return run_node("identify", TABLE, IdentifyNode, endless=False)
-
+NODE = Component("identify", TABLE, IdentifyNode, endless=False)
+main = NODE.run
 
 if __name__ == "__main__":
     sys.exit(main())

@@ -23,10 +23,10 @@ from rsea_ros.nodes._commands import WATCHDOG
 from rsea_ros.nodes._cycle import SECOND
 from rsea_ros.nodes._health import OK, WARN, Health, NodeHealth
 from rsea_ros.nodes._joint_inputs import InputSettings, ModelInputs, noise_from, stopped_sensors
-from rsea_ros.nodes._parameters import AXIS, JOINT, NodeParameter
+from rsea_ros.nodes._parameters import AXIS, JOINT, NodeParameter, let_change, live
 from rsea_ros.nodes._qos import COMMAND, LATCHED, RECORD_RELIABLE, await_arrival
 from rsea_ros.nodes._realtime import REALTIME, keep_time
-from rsea_ros.nodes._run import Program, run_node
+from rsea_ros.nodes._run import Component, Program
 from rsea_ros.nodes._waiter import Waiter
 
 EVERY = 128
@@ -190,7 +190,10 @@ class Flags:
         self._stamped.publish(efforts_message(self._stamp, {NAME: float(self._up)}))
 
 
-TABLE = (
+OF_BAND = ("tolerance_db", "tolerance_deg", "quiet")
+OF_ERROR = ("tolerance", "error_window", "error_hysteresis", "quiet")
+"""Parameters of the band and of the flag, which may change while the node runs: the flag begins anew then."""
+TABLE = live((
     NodeParameter(
         "rig", "paper_high_impedance", "the model: a name of config/rigs, or a file such as model.yaml"
     ),
@@ -215,7 +218,7 @@ TABLE = (
     NodeParameter("quiet", 0.2, "time below the noise floor that is no torque", "s", 0.0, 100.0),
     JOINT,
     *REALTIME,
-)
+), {*OF_BAND, *OF_ERROR})  # fmt: skip
 NAMES = ("distal", "proximal", "disturbance")
 TICK = 0.02
 """s between looks at what has come without ft."""
@@ -225,12 +228,9 @@ class ModelNode(Program):
     """Wakes at each ft and processes the messages that came with it; while ft is silent, every 20 ms."""
 
     def __init__(self, node: Node, values: dict[str, Any]) -> None:
-        rig = load_rig(values["rig"])
-        noise = noise_from(rig, values["identification"])
-        observer = Observer(rig, noise, hold=WATCHDOG / SECOND, duration=values["duration"])
-        self._band = TorqueBand(rig, *(values[n] for n in ("tolerance_db", "tolerance_deg", "quiet")))
-        asked = (values[n] for n in ("tolerance", "error_window", "error_hysteresis", "quiet"))
-        self._error = ErrorFlag(rig, ErrorSettings(*asked))
+        self._rig = rig = load_rig(values["rig"])
+        self._noise = noise = noise_from(rig, values["identification"])
+        self._observer = Observer(rig, noise, hold=WATCHDOG / SECOND, duration=values["duration"])
         qos = RECORD_RELIABLE if values["reliable"] else COMMAND
         self._estimates = node.create_publisher(JointState, "torque_estimate", qos)
         template = serialize_message(efforts_message(0, dict.fromkeys(NAMES, 0.0)))
@@ -238,13 +238,23 @@ class ModelNode(Program):
         self._flags, self._has_ft = Flags(node), "ft" in rig.sensors
         read = InputSettings(**{n: values[n] for n in ("ft_timeout", "axis", "reliable", "joint")})
         self._stopped = stopped_sensors(rig, noise)
-        self._inputs = ModelInputs(node, observer, self._stopped, read)
-        self._assess = ModelHealth(rig, noise, observer, self._band, self._error, self._inputs)
-        self._lock = threading.Lock()
+        self._inputs = ModelInputs(node, self._observer, self._stopped, read)
+        self._lock, self._values = threading.Lock(), values
+        self._change({})
+        let_change(node, TABLE, self._change)
         self._health = Health(node, self._report, values["rig"])
         self._waiter = Waiter(node, [self._inputs.ft.subscription], self._work, TICK)
         keep_time(node, self._waiter, values)
         node.get_logger().info(f"rig {rig.name}: pure torque up to {self._error.edge.hz:.1f} Hz")
+
+    def _change(self, new: dict[str, Any]) -> None:
+        """Make band, flag and assessment for new values; the observer goes on."""
+        values = {**self._values, **new}
+        band = TorqueBand(self._rig, *(values[name] for name in OF_BAND))
+        error = ErrorFlag(self._rig, ErrorSettings(*(values[name] for name in OF_ERROR)))
+        assess = ModelHealth(self._rig, self._noise, self._observer, band, error, self._inputs)
+        with self._lock:
+            self._band, self._error, self._assess, self._values = band, error, assess, values
 
     def _work(self) -> None:
         """Publish an estimate for each sample that came, and the flag when it changes."""
@@ -274,10 +284,8 @@ class ModelNode(Program):
         self._flags.lower()
 
 
-def main() -> int:
-    """Run the node."""
-    return run_node("model", TABLE, ModelNode)
-
+NODE = Component("model", TABLE, ModelNode, patience=8.0)  # ros2 launch kills after 10 s
+main = NODE.run
 
 if __name__ == "__main__":
     sys.exit(main())

@@ -12,7 +12,7 @@ from rsea_ros.nodes._bench_topics import NAMES, SPRING_FRAME, BenchTopics
 from rsea_ros.nodes._cycle import SECOND, Cycle
 from rsea_ros.nodes._health import Health
 from rsea_ros.nodes._parameters import NodeParameter
-from rsea_ros.nodes._run import Program, run_node
+from rsea_ros.nodes._run import Component, Program
 
 TABLE = (
     NodeParameter("rig", "paper_high_impedance", "rig to simulate: a name of config/rigs, or a file"),
@@ -81,10 +81,8 @@ class PlantNode(Program):
             self._log.warning(f"{gaps} samples were left out while this machine stood still")
 
 
-def main() -> int:
-    """Run the node."""
-    return run_node("plant", TABLE, PlantNode)
-
+NODE = Component("plant", TABLE, PlantNode)
+main = NODE.run
 
 if __name__ == "__main__":
     sys.exit(main())

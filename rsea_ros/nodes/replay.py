@@ -10,6 +10,7 @@ from typing import Any
 from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.publisher import Publisher
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 
 from msg_adapters import iterate
 from msg_adapters.ros import Clock, clock_message, message_type
@@ -17,9 +18,9 @@ from rsea_ros.errors import BagError, ParameterError
 from rsea_ros.nodes._cycle import SECOND, wait_until
 from rsea_ros.nodes._health import OK, STEADY, Health, NodeHealth
 from rsea_ros.nodes._parameters import NodeParameter
-from rsea_ros.nodes._qos import COMMAND, DISCOVERY_TIME, LATCHED, RECORD_RELIABLE
+from rsea_ros.nodes._qos import DISCOVERY_TIME, LATCHED, RECORD_RELIABLE
 from rsea_ros.nodes._realtime import Worker
-from rsea_ros.nodes._run import run_node
+from rsea_ros.nodes._run import Component
 
 TABLE = (
     NodeParameter("bag", "", "bag to play, a directory or a file"),
@@ -38,6 +39,8 @@ TABLE = (
 WAIT_FOR = ("torque_command", "joint_states", "ft")
 NEVER = {"/diagnostics", "/clock", "/rosout", "/parameter_events"}
 CLOCK_PERIOD = SECOND // 100
+CLOCK = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+"""As of rosbag2 and of use_sim_time: a reliable subscription waits up to 3 s for a time that was lost."""
 HEARTBEAT = Duration(seconds=4)
 """Longer than the middleware takes to learn that a reliable subscriber has everything."""
 
@@ -56,7 +59,7 @@ class ReplayNode(Worker):
         if not self._rows:
             raise BagError(f"{values['bag']}: no message after {values['start']:g} s, expected some")
         self._publishers = self._advertise({(topic, kind) for topic, kind, _, _ in self._rows})
-        self._clock = node.create_publisher(Clock, "/clock", COMMAND) if values["clock"] else None
+        self._clock = node.create_publisher(Clock, "/clock", CLOCK) if values["clock"] else None
         self._wanted = values["subscribers"]
         self._played = 0
         self._health = Health(node, self._report)
@@ -67,7 +70,7 @@ class ReplayNode(Worker):
         """Return a publisher for each topic whose type is installed."""
         publishers = {}
         for topic, kind in topics:
-            qos = LATCHED if topic.endswith("/pure_torque") else RECORD_RELIABLE
+            qos = LATCHED if topic.endswith(("/pure_torque", "/pure_torque_stamped")) else RECORD_RELIABLE
             try:
                 publishers[topic] = self._node.create_publisher(message_type(kind), topic, qos)
             except ParameterError as error:
@@ -80,19 +83,29 @@ class ReplayNode(Worker):
         while any(publisher.get_subscription_count() < self._wanted for publisher in heard):
             if self.stopping.wait(0.05):
                 return
-        begin, first, ticked = time.monotonic_ns() + DISCOVERY_TIME, self._rows[0][2], 0
+        self.stopping.wait(DISCOVERY_TIME / SECOND)
+        begin, first, ticked = time.monotonic_ns(), self._rows[0][2], 0
         for topic, _, logged, raw in self._rows:
             if self.stopping.is_set():
                 return
-            wait_until(begin + round((logged - first) / self._pace))
-            if self._clock and time.monotonic_ns() - ticked > CLOCK_PERIOD:
-                self._clock.publish(clock_message(logged))
-                ticked = time.monotonic_ns()
+            due = begin + round((logged - first) / self._pace)
+            while (now := time.monotonic_ns()) < due and not self.stopping.is_set():
+                ticked = self._tick(first + round((now - begin) * self._pace), ticked)
+                wait_until(min(due, now + CLOCK_PERIOD))
+            ticked = self._tick(logged, ticked)
             if topic in self._publishers:
                 self._publishers[topic].publish(raw)
             self._played += 1
         for publisher in self._publishers.values():
             publisher.wait_for_all_acked(HEARTBEAT)
+
+    def _tick(self, logged: int, ticked: int) -> int:
+        """Publish the time of the bag, ns, if that is due; return when it was published last, ns."""
+        now = time.monotonic_ns()
+        if self._clock is None or now - ticked < CLOCK_PERIOD:
+            return ticked
+        self._clock.publish(clock_message(logged))
+        return now
 
     def is_finished(self) -> bool:
         """Return whether all messages are published and have arrived. Raises what ended it before."""
@@ -117,10 +130,8 @@ class ReplayNode(Worker):
         return NodeHealth(OK, "playing", {"played": self._played, "messages": len(self._rows)})
 
 
-def main() -> int:
-    """Run the node."""
-    return run_node("replay", TABLE, ReplayNode, endless=False)
-
+NODE = Component("replay", TABLE, ReplayNode, endless=False)
+main = NODE.run
 
 if __name__ == "__main__":
     sys.exit(main())

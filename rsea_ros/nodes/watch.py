@@ -26,7 +26,7 @@ from rsea_ros.nodes._health import OK, Health, NodeHealth
 from rsea_ros.nodes._mailbox import Mailbox, MessageFields
 from rsea_ros.nodes._parameters import AXIS, JOINT, NodeParameter
 from rsea_ros.nodes._qos import COMMAND, LATCHED, MEASUREMENT, await_arrival, publishers_of
-from rsea_ros.nodes._run import Program, run_node
+from rsea_ros.nodes._run import Component, Program
 from rsea_ros.watch.command import Bounds, Commander
 from rsea_ros.watch.desk import Runs
 from rsea_ros.watch.server import Server
@@ -291,10 +291,8 @@ def _runs(node: Node, values: dict[str, Any]) -> Runs:
     return Runs(Path(values["out"]), ["-r", f"__ns:={namespace}"], verbs)
 
 
-def main() -> int:
-    """Run the node."""
-    return run_node("watch", TABLE, WatchNode)
-
+NODE = Component("watch", TABLE, WatchNode)
+main = NODE.run
 
 if __name__ == "__main__":
     sys.exit(main())

@@ -18,7 +18,7 @@ from rclpy.lifecycle import LifecycleNode
 
 from msg_adapters.ros import Trigger
 from rsea_ros import processes
-from rsea_ros.cli import main as cli
+from rsea_ros.cli import main as cli, run
 from rsea_ros.cli.call import offer_of
 from rsea_ros.cli.launch import node_calls, together
 from rsea_ros.cli.run import node_names, ros_arguments
@@ -176,3 +176,14 @@ def test_a_visitor_does_not_propose_itself(visitor, monkeypatch):
         _visitor.Caller(visitor).full_name("visitr")
     assert "node /rsea/visitr: it does not run" in str(error.value)
     assert "did you mean /rsea/visitor" not in str(error.value)
+
+
+def test_a_joint_is_run_of_the_kinds_that_are_named_with_parameters_for_all(monkeypatch):
+    started = []
+    monkeypatch.setattr(run, "become", started.append)
+    words = ["plant", "rate:=100.0", "model"]
+    run.run(SimpleNamespace(node="joint", parameters=words, params=False, pass_on=["-r", "__ns:=/left"]))
+    assert started == [[
+        "-m", "rsea_ros.nodes.joint", "plant", "model", "--ros-args", "-p", "rate:=100.0", "--", "-r",
+        "__ns:=/left",
+    ]]  # fmt: skip

@@ -47,6 +47,31 @@ def test_opening_begins_softly_and_without_a_fault(device):
     assert device.log == ["open", "read"] and joint.fault is None
 
 
+def test_a_lowered_limit_acts_in_the_next_cycle_and_none_is_raised_under_torque(device):
+    stated = {"torque": 60.0, "slew": 64.0, "voltage": 20.0}
+    joint = GuardedDevice(device, Limits(1.0), 64.0, None, lambda rating: Limits(**stated, derived={}))
+    device.reading["voltage"] = 24.0
+    joint.open()
+    joint.enable()
+    while joint.write(10.0, 0.0) < 10.0:
+        pass
+    stated["torque"] = 3.0
+    joint.limit(["torque"])
+    assert joint.write(10.0, 0.0) == 3.0, "the slew limit, 1 N m a cycle, would take 7 cycles"
+    stated["torque"] = 4.0
+    with pytest.raises(ParameterError, match="torque is raised while active, expected deactivate first"):
+        joint.limit(["torque"])
+    stated["voltage"] = 19.0
+    with pytest.raises(ParameterError, match="voltage = 19, expected at least 20"):
+        joint.limit(["voltage"])
+    joint.disable()
+    joint.limit(["torque"])
+    assert joint.guard.limits.torque == 4.0 and joint.guard.limits.voltage == 20.0
+    stated["torque"] = 61.0
+    with pytest.raises(ParameterError, match="torque = 61, expected at most 60"):
+        joint.limit(["torque"])
+
+
 @pytest.mark.parametrize(
     ("kind", "how", "refused"),
     [

@@ -1,5 +1,7 @@
 """The whole watch on a bench that shares no code with the model: changes are named and sized."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from independent.bench import Bench, record_command
@@ -56,6 +58,10 @@ def test_a_healthy_joint_is_not_alarmed_and_its_parameters_are_right():
     values = {e.name: e for e in monitor.estimates()}
     low, high = values["spring.stiffness"].ci95
     assert low < BENCH.plant.k_s < high and high - low < 0.03 * BENCH.plant.k_s
+    changes, before = monitor.changes, monitor.changes._cusum.h
+    monitor.watch(replace(SETTINGS, rate=1e3 * SETTINGS.rate, every=2.0 * SETTINGS.every))
+    assert monitor.changes is changes, "what has been learned stays"
+    assert changes._cusum.h < before - 3.0 and monitor._cutter.every == 2.0 * SETTINGS.every
 
 
 def test_a_joint_in_a_position_loop_is_refused():

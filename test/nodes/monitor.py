@@ -7,8 +7,8 @@ from rsea_ros.hardware.device import NoReply, State
 from rsea_ros.hardware.guarded import GuardedDevice
 from rsea_ros.hardware.limits import Limits
 from rsea_ros.hardware.protection import BUS_WATCHDOG, Protection
-from rsea_ros.nodes._anchor import SECOND, Anchor
 from rsea_ros.nodes._commands import CommandQueue
+from rsea_ros.nodes._cycle import SECOND, Anchor
 from rsea_ros.nodes._drive import DriverCycle, step
 
 LONGEST = WATCHDOG = 0.1

@@ -25,7 +25,7 @@ def made(monkeypatch):
     monkeypatch.setattr(module, "await_arrival", lambda publisher: calls.append("arrived"))
     node = ControllerNode.__new__(ControllerNode)
     node._node = SimpleNamespace(get_logger=lambda: SimpleNamespace(error=calls.append, info=calls.append))
-    node._values = {"stale": 0.05, "release": 0.1, "preview": False, "rate": 100.0}
+    node._values = {"stale": 0.05, "release": 0.1, "preview": False, "rate": 100.0, "torque_limit": 68.0}
     node._period, node._lock = float(PERIOD), threading.Lock()
     margins = {"locked": (30.0, 50.0, 9.0, 1.5), "free": (20.0, 45.0, 8.0, 1.25)}
     node._design = SimpleNamespace(margins={
@@ -53,7 +53,7 @@ def made(monkeypatch):
         sent=lambda torque: calls.append(("sent", torque)), probe=lambda *a, **k: None, doubted=False,
     )  # fmt: skip
     share = SimpleNamespace(feedback=0.5, compensation=0.25, limited=True)
-    node._controller = SimpleNamespace(
+    node._controller = node._newest = SimpleNamespace(
         share=share, step=lambda *a, **k: calls.append((a[1:], k)) or 2.5,
         start=lambda r, desired: calls.append(("start", desired)),
     )  # fmt: skip

@@ -22,9 +22,9 @@ from rsea_ros.nodes._parameters import DERIVED, NodeParameter, _descriptor, stat
     ],
 )
 def test_a_range_is_told_in_the_type_of_its_parameter(monkeypatch, parameter, about, expected, bounds):
-    monkeypatch.setattr(_parameters, "parameter_descriptor", lambda *told: told)
+    monkeypatch.setattr(_parameters, "parameter_descriptor", lambda *told, fixed: (*told, fixed))
     told = _descriptor(parameter)
-    assert told == (about, f"expected {expected}", bounds)
+    assert told == (about, f"expected {expected}", bounds, True)
     if bounds is not None:
         assert [type(v) for v in told[2]] == [type(parameter.default)] * 2
 

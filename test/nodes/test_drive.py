@@ -5,7 +5,7 @@ import random
 import pytest
 
 from rsea_ros.errors import DeviceError
-from rsea_ros.nodes._anchor import SECOND
+from rsea_ros.nodes._cycle import SECOND
 from test.nodes.monitor import World
 
 HOUR = 3600 * SECOND

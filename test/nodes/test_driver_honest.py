@@ -13,8 +13,8 @@ import pytest
 
 from msg_adapters.ros import JointState, torque_command_message
 from rsea_ros.nodes._bench_topics import Obeyed
-from rsea_ros.nodes._drive import SignalListener
 from rsea_ros.nodes._qos import COMMAND
+from rsea_ros.nodes._run import SignalListener
 from rsea_ros.nodes._waiter import Pulse, anything_to_do
 from test.nodes.clock_shim import preload, set_clock
 from test.nodes.conftest import as_argument
@@ -147,12 +147,12 @@ def test_a_signal_acts_while_the_main_thread_waits(listener):
     sender = threading.Timer(0.1, os.kill, (os.getpid(), signal.SIGHUP))
     late = threading.Timer(0.1, lambda: order.append(reacted.wait(20.0)))
     order = []
-    pulse = Pulse(listener.node, 0.5)
+    pulse = Pulse(listener.node.context, 0.5)
     try:
         sender.start()
         late.start()
         while not order:
-            anything_to_do(listener.node, listener._executor, pulse)
+            anything_to_do([listener.node], listener._executor, pulse)
         assert order == [True]
     finally:
         pulse.close()

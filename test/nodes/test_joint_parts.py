@@ -28,7 +28,7 @@ def made():
         n: lambda text, n=n, **k: calls.append((n, text)) for n in ("info", "warning", "error")
     })  # fmt: skip
     joint._node = SimpleNamespace(get_logger=lambda: logger)
-    joint.part, joint._ended, joint._reported = "", "", (None, 0)
+    joint.part, joint._ended, joint._double, joint._reported = "", "", "", (None, 0)
     joint._health = SimpleNamespace(publish=lambda: calls.append("health"))
     guard = SimpleNamespace(limited=0, limits=Limits(torque=8.0, slew=300.0), refused=2)
     joint.guarded = SimpleNamespace(
@@ -48,6 +48,7 @@ def made():
     joint._cycle = SimpleNamespace(rest=lambda: calls.append("rest"))
     asked = []
     joint.topics = SimpleNamespace(
+        namesakes=SimpleNamespace(look=lambda: ""),
         report=lambda cycle, lost: asked.append(lost) or NodeHealth(OK, "running", {"late": 1}), asked=asked)
     return joint, calls
 

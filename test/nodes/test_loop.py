@@ -30,7 +30,7 @@ def bag(tmp_path_factory):
 
 
 def test_replay_keeps_stamps_and_gives_identify_everything(bag, start, listener, tmp_path):
-    clock = listener.hear(Clock, "/clock", COMMAND)
+    clock = listener.hear(Clock, "/clock", MEASUREMENT)
     states = listener.hear(JointState, "/rsea/joint_states", RECORD_RELIABLE)
     listener.hear(JointState, "/rsea/torque_command", RECORD_RELIABLE)
     identify = start("identify", rig=RIG, out=tmp_path, reliable=True)

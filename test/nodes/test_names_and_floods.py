@@ -13,8 +13,8 @@ from msg_adapters.ros import JointState, Trigger, WrenchStamped, stamp_of, torqu
 from msg_adapters.topic_map import FLOATS
 from rsea_ros.hardware.device import NoReply
 from rsea_ros.nodes import driver
-from rsea_ros.nodes._anchor import Anchor
 from rsea_ros.nodes._bench_topics import MOST, NAMES, BenchTopics
+from rsea_ros.nodes._cycle import Anchor
 from rsea_ros.nodes._qos import COMMAND, LATCHED, MEASUREMENT
 from rsea_ros.nodes.model import Flags
 from test.nodes.test_driver import Spy

@@ -77,12 +77,16 @@ class Loop:
             np.sqrt(np.mean(error[period == p] ** 2)) / amplitude * np.sqrt(2.0) for p in np.unique(period)
         ]
 
+    def desire(self, torque):
+        """Publish a desired torque of now."""
+        self._desired.publish(torque_command_message(time.time_ns(), torque))
+
     def hold(self, torque, condition):
         """Publish a constant torque until a condition holds."""
         mend_now_and_then = every(1.5, self.mend)
 
         def done():
-            self._desired.publish(torque_command_message(time.time_ns(), torque))
+            self.desire(torque)
             mend_now_and_then()
             return condition()
 
