@@ -134,8 +134,8 @@ def _noting(acts: Counter[str]) -> Iterator[None]:
         does = BRANCHES[name].acts or (lambda result, *args: not _same(result, off(*args)))
 
         def make(before: Off) -> Off:
-            def call(*args: Any) -> Any:
-                result = before(*args)
+            def call(*args: Any, **kwargs: Any) -> Any:
+                result = before(*args, **kwargs)
                 acts[name] += does(result, *args)
                 return result
 
