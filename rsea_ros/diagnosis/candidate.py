@@ -14,7 +14,7 @@ from rsea_ros.effects.signal_table import sensor_of
 from rsea_ros.identification.noise_level import reestimate_noise
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Map, Solution, serial, solve
-from rsea_ros.identification.unknowns import Unknown
+from rsea_ros.identification.unknowns import LOOP_CLOCK, Unknown
 from rsea_ros.model.drive import Drive, coarser, finer
 from rsea_ros.records.record import FloatArray
 from rsea_ros.records.statistics import Z95
@@ -63,17 +63,17 @@ def without_effect(problem: Problem, theta: FloatArray, name: str) -> tuple[Prob
 
 
 def without_clocks(problem: Problem, theta: FloatArray) -> tuple[Problem, FloatArray]:
-    """Return a problem and its theta with all clocks taken as right.
+    """Return a problem and its theta with all clocks taken as right, but for a loop's own torque.
 
     Beside a misfit far above the noise the clocks only run to their bounds and lead the search astray.
     """
-    keep = [i for i, u in enumerate(problem.unknowns) if not u.is_clock]
+    keep = [i for i, u in enumerate(problem.unknowns) if not u.is_clock or u.name == LOOP_CLOCK]
     return replace(problem, unknowns=tuple(problem.unknowns[i] for i in keep)), theta[keep]
 
 
 def with_clocks(problem: Problem, theta: FloatArray, model: Problem) -> tuple[Problem, FloatArray]:
     """Return a problem and its theta with the clocks of another problem free again, at zero."""
-    clocks = tuple(u for u in model.unknowns if u.is_clock)
+    clocks = tuple(u for u in model.unknowns if u.is_clock and u.name != LOOP_CLOCK)
     larger = replace(problem, unknowns=(*problem.unknowns, *clocks))
     return larger, np.concatenate([theta, np.zeros(len(clocks))])
 

@@ -33,7 +33,7 @@ from rsea_ros.effects.effect import Effect
 from rsea_ros.identification.confidence import is_off_rig
 from rsea_ros.identification.problem import Problem
 from rsea_ros.identification.solver import Pools
-from rsea_ros.identification.unknowns import vector_of
+from rsea_ros.identification.unknowns import LOOP_CLOCK, theta_with, vector_of
 from rsea_ros.model.rig import Rig
 from rsea_ros.progress import Progress
 
@@ -200,9 +200,17 @@ def select_stepwise(
 
 
 def _fit_nominal(nominal: Problem, setup: FitSetup, start: Rig | None) -> Candidate:
-    """Fit the nominal model, and again with the noise that its residual shows."""
+    """Fit the nominal model, and again with the noise that its residual shows.
+
+    A loop's torque is constant over a tick, and so is its residual over a clock: both conventions are starts.
+    """
     theta = vector_of(nominal.unknowns, start) if start else None
-    first = fit_candidate(replace(setup, iterations=25), nominal, theta)
+    longer = replace(setup, iterations=25)
+    first = fit_candidate(longer, nominal, theta)
+    own = {u.name: u.doubt for u in nominal.unknowns if u.name == LOOP_CLOCK}
+    if own:
+        other = fit_candidate(longer, nominal, theta_with(nominal.unknowns, first.solution.theta, own))
+        first = min(first, other, key=lambda m: m.solution.cost)
     return refit(with_noise_reestimated(first), setup)
 
 
