@@ -95,8 +95,6 @@ def refusal(model: Scored, current: Scored, settings: DiagnosisSettings = DEFAUL
     over_current = preference(
         model.validation, current.validation, model.parameters - current.parameters, rule
     )
-    if keeps_known_values(model, current, settings):
-        return None
     if not over_current.better:
         return "too_small" if over_current.sure else "not_sure"
     if likelier_by(model, current, settings.floor.far) < 0.0:

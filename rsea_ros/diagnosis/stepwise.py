@@ -2,12 +2,13 @@
 
 All are screened and the promising fitted on short pieces of the data; the best of those are fitted to all
 training blocks. Where none is acceptable, effects that the pieces overlooked are tried, then effects on the
-measured rotor angle, then two at once.
+measured rotor angle, then two at once. Two at once are also tried where the best fits only far from the rig.
 
 Models are fitted to the training blocks and chosen on the validation blocks; the test blocks are not touched.
 """
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -19,6 +20,7 @@ from rsea_ros.diagnosis.candidate import (
     fit_candidate,
     leaves_only_noise,
     on_fine_steps,
+    prior_cost,
     refit,
     rescore,
     with_noise_reestimated,
@@ -32,7 +34,7 @@ from rsea_ros.effects.catalogue import look_alikes
 from rsea_ros.effects.effect import Effect
 from rsea_ros.identification.confidence import is_off_rig
 from rsea_ros.identification.problem import Problem
-from rsea_ros.identification.solver import Pools
+from rsea_ros.identification.solver import Pools, Solution
 from rsea_ros.identification.unknowns import LOOP_CLOCK, theta_with, vector_of
 from rsea_ros.model.rig import Rig
 from rsea_ros.progress import Progress
@@ -80,7 +82,11 @@ class ForwardStep:
             is_far_from_floor(m, self.settings) for m in self._acceptable(models)
         ):
             models += self.fits.on_measured_angle()
-        chosen = self._choose(self._acceptable(models) or self._pairs(finalists))
+        contenders = self._acceptable(models) or self._pairs(finalists)
+        chosen = self._choose(contenders)
+        if chosen is not None and is_off_rig(chosen.solution):
+            contenders += self._pairs_nearer_the_rig(chosen, close)
+            chosen = self._choose(contenders)
         trials = [self._far_behind(s) for s in _others(screened, finalists)]
         trials += [self._refusal(m, chosen) for m in models if m is not chosen]
         return StepResult(chosen, trials)
@@ -128,16 +134,34 @@ class ForwardStep:
 
     def _pairs(self, firsts: Sequence[ScreenedEffect]) -> list[Candidate]:
         """Return acceptable models with two more effects, for where none helps alone and much is left."""
+        if not self.fits.is_far:
+            return []
+        return self._pairs_beside(firsts, self.fits.with_typical)
+
+    def _pairs_nearer_the_rig(self, chosen: Candidate, close: Sequence[ScreenedEffect]) -> list[Candidate]:
+        """Return acceptable models with two more effects, the first of which leaves the rig's values less.
+
+        Where two effects are missing, a third may fit as well alone, but only far from the rig.
+        """
+        most = 0.5 * self.fits.on_pieces.cost
+        away = {s.name: prior_cost(s.problem, s.theta) for s in close if s.cost < most}
+        nearer = [s for s in close if away.get(s.name, math.inf) < 0.5 * chosen.prior_cost]
+        return self._pairs_beside(sorted(nearer, key=lambda s: away[s.name]), self.fits.with_fitted)
+
+    def _pairs_beside(
+        self, firsts: Sequence[ScreenedEffect], with_first: Callable[[ScreenedEffect], Solution]
+    ) -> list[Candidate]:
+        """Return acceptable models with an effect beside one of the first. with_first: on the pieces."""
         fits = self.fits
-        if not fits.is_far or len(self.current.causes) > 1:  # beside more, it fits what is left
+        if len(self.current.causes) > 1:  # beside more of them, a pair fits whatever is left
             return []
         pairs: list[ScreenedEffect] = []
-        for first in firsts[:_PAIRED]:
-            pairs += fits.fit_pieces(fits.screen(fits.with_typical(first))[:_PAIRED])
+        for first in firsts[: _PAIRED]:
+            pairs += fits.fit_pieces(fits.screen(with_first(first))[: _PAIRED])
         promising = sorted(
             (p for p in pairs if p.cost < _HOPE_OF_TWO * fits.on_pieces.cost), key=lambda p: p.cost
         )
-        return self._acceptable(fits.fit_all(promising[:_PAIR_FITS]))
+        return self._acceptable(fits.fit_all(promising[: _PAIR_FITS]))
 
     def _far_behind(self, screened: ScreenedEffect) -> Trial:
         problem, theta = self.fits.complete(screened)
@@ -215,9 +239,6 @@ def _fit_nominal(nominal: Problem, setup: FitSetup, start: Rig | None) -> Candid
 
 
 def _is_finished(model: Candidate) -> bool:
-    """Return whether only noise is left; coloured noise may hide a cause that a fit still finds.
-
-    So may a cause that has moved the rig's values: one more may bring them back.
-    """
-    is_open = any(case.coloured for case in model.cases) or (model.causes and is_off_rig(model.solution))
-    return leaves_only_noise(model, model.settings.floor.only_noise) and not is_open
+    """Return whether only noise is left; coloured noise may hide a cause that a fit still finds."""
+    is_coloured = any(case.coloured for case in model.cases)
+    return leaves_only_noise(model, model.settings.floor.only_noise) and not is_coloured

@@ -84,13 +84,6 @@ def test_a_candidate_must_take_away_enough(candidate, current, reason):
     assert is_acceptable(candidate, current, RULE) is (reason is None)
 
 
-@pytest.mark.parametrize(("spared", "reason"), [(3.5, None), (2.5, "not_sure")])
-def test_a_candidate_that_gains_nothing_is_accepted_where_known_values_pay_for_it(spared, reason):
-    """One more parameter costs 2, and known values decide from 1 on."""
-    now = replace(model(A, ft=1.0, prior_cost=10.0 - spared), parameters=7)
-    assert refusal(now, replace(model(ft=1.0, prior_cost=10.0), parameters=6)) == reason
-
-
 def test_a_model_at_the_noise_is_enough_whatever_it_gains():
     rule = replace(DEFAULT, floor=replace(DEFAULT.floor, only_noise=1.0))
     assert refusal(model(A, ft=0.96875), model(ft=1.03125), rule) is None
