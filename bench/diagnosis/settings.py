@@ -1,6 +1,6 @@
 """Outcomes over one number of DiagnosisSettings, each number moved alone: why it has its value.
 
-    settings                                       the ten curves of docs/settings.md
+    settings                                       the eight curves of docs/settings.md
     settings acceptance.fall 0.05 0.2 --limit 24   one, on records of the benchmark
     settings --list                                every number and its reason
 
@@ -28,7 +28,6 @@ CURVES: Mapping[str, Sequence[float]] = {
     "floor.reached": (1.05, 1.2, 1.4),
     "forward.piece_fits": (3, 5, 15),
     "forward.full_fits": (1, 2, 6),
-    "forward.hope_one": (0.8, 0.9, 1.0),
     "naming.confirmed_at_floor": (0.5, 0.9, 0.98),
     "naming.confirmed": (0.8, 0.9, 0.995),
 }

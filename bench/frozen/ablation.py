@@ -83,9 +83,6 @@ BRANCHES: Mapping[str, Branch] = {
         {"backward_elimination:ReducedModels._with": _fitted_on}, acts=_was_dropped),
     "close rivals fitted to the end": Branch(
         {"naming.weighing:_beside_all_causes": lambda tried, *_: tried}, late=True),
-    "a cause that changes nothing": Branch(
-        late=True, setting=("evidence", "least_contribution", 0.0),
-        noted="naming.evidence:rows_of", acts=lambda rows, *_: rows is None),
     "wandering sensor (carried)": Branch(
         late=True, setting=("naming", "carried", math.inf), noted="naming.status:probabilities_and_status",
         acts=lambda _, every, *__: every[0].signature.carried > DEFAULT.naming.carried),
@@ -134,8 +131,8 @@ def _noting(acts: Counter[str]) -> Iterator[None]:
         does = BRANCHES[name].acts or (lambda result, *args: not _same(result, off(*args)))
 
         def make(before: Off) -> Off:
-            def call(*args: Any) -> Any:
-                result = before(*args)
+            def call(*args: Any, **kwargs: Any) -> Any:
+                result = before(*args, **kwargs)
                 acts[name] += does(result, *args)
                 return result
 

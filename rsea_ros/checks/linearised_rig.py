@@ -16,9 +16,8 @@ from typing import NamedTuple
 import numpy as np
 
 from rsea_ros.errors import IdentificationError
-from rsea_ros.identification.confidence import inverse_of, sum_by_block
+from rsea_ros.identification.confidence import BLOCK, inverse_of, sum_by_block
 from rsea_ros.identification.problem import Case, Problem, case_from, channels_that_tell
-from rsea_ros.identification.settings import INTERVALS
 from rsea_ros.identification.solver import jacobian
 from rsea_ros.identification.unknowns import Unknown, clocks, start_vector, unknowns_of_rig
 from rsea_ros.model.rig import Rig
@@ -155,7 +154,7 @@ def rows_of(setting: LinearSetting, residual: FitResidual, known: Slope | None =
     columns = [moved[:, n:] * (t - setting.start)[:, None]]
     columns += [of_channel * column[:, None] for column in residual.plain.T]
     weight = 1.0 / np.maximum(residual.misfit, _LEAST_MISFIT)[residual.of]
-    block = np.floor((t - t.min()) / min(INTERVALS.block, case.duration / _BLOCKS)).astype(np.int64)
+    block = np.floor((t - t.min()) / min(BLOCK, case.duration / _BLOCKS)).astype(np.int64)
     matrix = np.column_stack([moved, *columns]) * weight[:, None]
     return LinearisedRows(residual, known, residual.residual * weight, matrix, block)
 

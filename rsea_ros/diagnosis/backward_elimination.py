@@ -27,7 +27,7 @@ from rsea_ros.diagnosis.initial_guess import initial_guesses, view_for
 from rsea_ros.diagnosis.result import Reason
 from rsea_ros.diagnosis.score import likelier_by
 from rsea_ros.diagnosis.settings import DiagnosisSettings
-from rsea_ros.diagnosis.step_fits import ScreenedEffect, screen
+from rsea_ros.diagnosis.step_fits import QUICK_FIT, ScreenedEffect, screen
 from rsea_ros.effects.catalogue import effect_named, look_alikes
 from rsea_ros.effects.effect import Effect
 from rsea_ros.effects.guess import Guess
@@ -120,10 +120,10 @@ class ReducedModels:
         guesses += [{**rival.typical, **same}] if old.unit == rival.main.unit else []
         can_be_nothing = math.isfinite(old.null) and not old.logarithmic
         guesses += [in_exchange(model.solution, name, rival)] if can_be_nothing else []
-        screened = screen(solution, rival, guesses, self.settings.forward)
+        screened = screen(solution, rival, guesses)
         if screened is None or not (is_listed(rival, name) or self._is_close(screened, model)):
             return None
-        setup = replace(self._setup(model), is_quick=True, iterations=self.settings.fits.full_iterations)
+        setup = replace(self._setup(model), is_quick=True, iterations=QUICK_FIT)
         quick = fit_candidate(setup, screened.problem, screened.theta)
         if self._is_far(quick) and not self._is_far(model):  # more steps would not bring it near
             return quick

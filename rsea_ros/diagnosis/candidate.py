@@ -14,7 +14,7 @@ from rsea_ros.effects.signal_table import sensor_of
 from rsea_ros.identification.noise_level import reestimate_noise
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Map, Solution, serial, solve
-from rsea_ros.identification.unknowns import Unknown
+from rsea_ros.identification.unknowns import LOOP_CLOCK, Unknown
 from rsea_ros.model.drive import Drive, coarser, finer
 from rsea_ros.records.record import FloatArray
 from rsea_ros.records.statistics import Z95
@@ -63,17 +63,17 @@ def without_effect(problem: Problem, theta: FloatArray, name: str) -> tuple[Prob
 
 
 def without_clocks(problem: Problem, theta: FloatArray) -> tuple[Problem, FloatArray]:
-    """Return a problem and its theta with all clocks taken as right.
+    """Return a problem and its theta with all clocks taken as right, but for a loop's own torque.
 
     Beside a misfit far above the noise the clocks only run to their bounds and lead the search astray.
     """
-    keep = [i for i, u in enumerate(problem.unknowns) if not u.is_clock]
+    keep = [i for i, u in enumerate(problem.unknowns) if not u.is_clock or u.name == LOOP_CLOCK]
     return replace(problem, unknowns=tuple(problem.unknowns[i] for i in keep)), theta[keep]
 
 
 def with_clocks(problem: Problem, theta: FloatArray, model: Problem) -> tuple[Problem, FloatArray]:
     """Return a problem and its theta with the clocks of another problem free again, at zero."""
-    clocks = tuple(u for u in model.unknowns if u.is_clock)
+    clocks = tuple(u for u in model.unknowns if u.is_clock and u.name != LOOP_CLOCK)
     larger = replace(problem, unknowns=(*problem.unknowns, *clocks))
     return larger, np.concatenate([theta, np.zeros(len(clocks))])
 
@@ -176,11 +176,22 @@ class Candidate:
         return bool(self.newest) and is_at_bound(self.solution, self.newest, near)
 
 
+ITERATIONS = 12
+"""Gauss-Newton steps of a fit that begins near its end; twice as many, and one, of one that does not."""
+GAIN, LAST_GAIN, _FARTHEST = 2e-4, 1e-6, 20.0
+"""Relative fall of the cost, at the noise, below which a fit is done, and one of a model that is tested, far
+below the doubt of a parameter; times the noise up to which it grows with the residual, whose small falls mean
+nothing far above."""
+_STEP_ERROR = 0.05
+"""Of the noise: change by half a step from which a model is simulated on shorter ones. At 0.25 a delay that
+moved the steps off the commands paid for itself, and was confirmed."""
+
+
 @dataclass(frozen=True)
 class FitSetup:
     """On which samples candidates are fitted, in which units, how far, and by which means.
 
-    weights: a score whose misfit counts as noise. iterations, gain: other limits than those of the settings.
+    weights: a score whose misfit counts as noise. iterations, gain: where a fit ends.
     run: how derivatives are made, one after another or in a pool. is_quick: on steps twice as long.
     """
 
@@ -189,8 +200,8 @@ class FitSetup:
     run: Map = serial
     weights: Score | None = None
     blocks: tuple[int, ...] = TRAIN
-    iterations: int | None = None
-    gain: float | None = None
+    iterations: int = ITERATIONS
+    gain: float = GAIN
     is_quick: bool = False
 
     def mask(self, problem: Problem) -> Problem:
@@ -200,11 +211,8 @@ class FitSetup:
 
     def solve(self, problem: Problem, theta: FloatArray | None, matrix: FloatArray | None = None) -> Solution:
         """Fit the unknowns of a masked problem. matrix: derivatives to begin with."""
-        rule = self.settings.fits
-        gain = rule.gain if self.gain is None else self.gain
-        iterations = rule.iterations if self.iterations is None else self.iterations
-        gain *= _distance(self.weights, rule.farthest)
-        return solve(problem, theta, iterations=iterations, gain=gain, run=self.run, matrix=matrix)
+        gain = self.gain * _distance(self.weights)
+        return solve(problem, theta, iterations=self.iterations, gain=gain, run=self.run, matrix=matrix)
 
 
 def fit_candidate(
@@ -238,7 +246,7 @@ def on_fine_steps(model: Candidate, setup: FitSetup) -> Candidate:
     """
     if model.problem.rig.loop is not None:
         return model
-    limit, error = setup.settings.fits.step_error, np.inf
+    error = np.inf
     best = cases, outputs = model.cases, model.outputs
     for _ in range(_HALVINGS + 1):
         halved = tuple(replace(c, drive=finer(c.drive)) if isinstance(c.drive, Drive) else c for c in cases)
@@ -247,7 +255,7 @@ def on_fine_steps(model: Candidate, setup: FitSetup) -> Candidate:
         if change > _FALLS * error:
             break
         best, error = (cases, outputs), change
-        if change < limit:
+        if change < _STEP_ERROR:
             break
         cases, outputs = halved, finer_outputs
     cases, outputs = best
@@ -271,9 +279,9 @@ def _change(
 
 def with_noise_reestimated(model: Candidate) -> Candidate:
     """Return a candidate with the noise that its own residual shows, scored against that."""
-    ratio, rule = model.problem.rig["gear.ratio"], model.settings.noise
+    ratio = model.problem.rig["gear.ratio"]
     runs = zip(model.cases, model.outputs, strict=True)
-    return rescore(model, tuple(reestimate_noise(c, out, ratio, rule) for c, out in runs))
+    return rescore(model, tuple(reestimate_noise(c, out, ratio) for c, out in runs))
 
 
 def rescore(model: Candidate, cases: tuple[Case, ...]) -> Candidate:
@@ -336,10 +344,10 @@ def _main(solution: Solution, name: str) -> tuple[Unknown, float]:
     return next((u, float(t)) for u, t in unknowns if u.name == main)
 
 
-def _distance(weights: Score | None, farthest: float) -> float:
+def _distance(weights: Score | None) -> float:
     """Return the RMS of a residual over the noise in its worst channel, at least 1."""
     ratios = [] if weights is None else [weights.ratio(n) for n in weights.sums]
-    return min(max([1.0, *ratios]), farthest)
+    return min(max([1.0, *ratios]), _FARTHEST)
 
 
 def _reweight(solution: Solution, problem: Problem) -> FloatArray:

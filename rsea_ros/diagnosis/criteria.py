@@ -66,7 +66,7 @@ def preference(
     difference = other.loss(other) - model.loss(other)
     price = rule.price * extra_parameters / len(difference)
     means = bootstrap_means(difference - price, rule.resamples)
-    shows_response = model.missed < rule.response_left * other.missed
+    shows_response = model.missed < 0.5 * other.missed  # sees most of it
     return Preference(
         sure=bool(np.quantile(means, rule.doubt) > 0.0),
         matters=max(falls(model, other), default=0.0) > rule.matters or shows_response,

@@ -59,6 +59,10 @@ def part(case: Case, sets: tuple[int, ...], rule: BlockSettings) -> Case:
     return case.within(mask)
 
 
+_RUN_UP, _ENOUGH = 0.5, 14.0
+"""s: simulated and not compared before a piece, in which the measured state decays; data in all pieces."""
+
+
 def short_pieces_of(
     case: Case, outputs: Mapping[str, FloatArray], settings: DiagnosisSettings = DEFAULT
 ) -> tuple[Case, ...]:
@@ -68,24 +72,24 @@ def short_pieces_of(
     A case of a measured motion (inverse model) costs little and is returned whole, and so is one without a
     position: nothing says in which state a piece of it begins.
     """
-    rule, blocks = settings.pieces, settings.blocks
+    blocks = settings.blocks
     fit = part(case, TRAIN, blocks)
     thinner = as_often_as_commands(fit)
     drive = thinner.drive
-    if not isinstance(drive, Drive) or drive.duration < 2.0 * rule.enough or "position" not in case.measured:
+    if not isinstance(drive, Drive) or drive.duration < 2.0 * _ENOUGH or "position" not in case.measured:
         return (thinner,)
     length = 2.0 * block_length(case, blocks)
     pairs = train_starts(case, blocks)[1:]
-    starts = pairs[[_is_covered(drive, t - rule.run_up, t + length) for t in pairs]]
-    half = round(0.5 * rule.enough / length)
+    starts = pairs[[_is_covered(drive, t - _RUN_UP, t + length) for t in pairs]]
+    half = round(0.5 * _ENOUGH / length)
     spread = np.unique(np.linspace(0, len(starts) - 1, 2 * half + 1).round().astype(int)[1::2])
     misfit = np.array([misfit_between(fit, outputs, float(t), length) for t in starts])
     misfit[spread] = -1.0
     worst = np.argsort(misfit)[len(spread) - 2 * half :]
     chosen = starts[np.sort(np.concatenate([spread, worst]))]
-    begins = [_piece_start(drive, float(t), rule.run_up) for t in chosen]
+    begins = [_piece_start(drive, float(t), _RUN_UP) for t in chosen]
     return tuple(
-        _piece(thinner, drive, k, float(t) + length, rule.run_up, *_start(case, drive, k, outputs))
+        _piece(thinner, drive, k, float(t) + length, _RUN_UP, *_start(case, drive, k, outputs))
         for k, t in zip(begins, chosen, strict=True)
     )
 

@@ -88,7 +88,7 @@ def nominal_problem(
     checked: Sequence[Checked], rig: Rig, settings: DiagnosisSettings = DEFAULT
 ) -> Problem:
     """Return the fit of a rig to checked records: the nominal model."""
-    cases = tuple(case_from(c.record, rig, c.masked, settings.noise) for c in checked)
+    cases = tuple(case_from(c.record, rig, c.masked) for c in checked)
     stated = frozenset(e.name for e in rig.effects)
     return Problem(cases, rig, unknowns_of(rig, cases), MEASURED, stated=stated)
 

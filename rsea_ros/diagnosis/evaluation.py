@@ -5,15 +5,14 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 from rsea_ros.checks.faults import Checked
-from rsea_ros.diagnosis.candidate import Candidate, FitSetup, fit_candidate
+from rsea_ros.diagnosis.candidate import LAST_GAIN, Candidate, FitSetup, fit_candidate
 from rsea_ros.diagnosis.data_split import TEST, TRAIN, VALIDATION
 from rsea_ros.diagnosis.result import Reason
 from rsea_ros.diagnosis.score import Score, score, score_on
-from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings
+from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.diagnosis.stretches import spread_over
 from rsea_ros.identification.confidence import Confidence, confidence_of
 from rsea_ros.identification.problem import Case, Problem, case_from, simulate_cases
-from rsea_ros.identification.settings import IntervalSettings
 from rsea_ros.identification.solver import Pools, Solution
 from rsea_ros.identification.unknowns import apply
 from rsea_ros.model.prediction_errors import in_phase
@@ -90,14 +89,12 @@ class Evaluated:
     """A model of the selection as it is reported.
 
     train: its score on the blocks that it was fitted to. test: on the test blocks, or on the held-out record.
-    intervals: how those of its values are made.
     """
 
     solution: Solution
     outputs: list[dict[str, FloatArray]]
     train: Score
     test: Score
-    intervals: IntervalSettings = DEFAULT.intervals
 
     @property
     def added(self) -> str:
@@ -107,7 +104,7 @@ class Evaluated:
     @cached_property
     def confidence(self) -> Confidence:
         """The doubt that is left of the fit's values."""
-        return confidence_of(self.solution, rule=self.intervals)
+        return confidence_of(self.solution)
 
 
 @dataclass(frozen=True)
@@ -126,7 +123,7 @@ class HeldOut:
     def _case(self) -> Case | None:
         if self.record is None:
             return None
-        case = case_from(self.record.record, self.nominal, self.record.masked, self.settings.noise)
+        case = case_from(self.record.record, self.nominal, self.record.masked)
         return spread_over(case.with_noise(fitted_noise(self.cases)), self.nominal, self.settings)
 
     def score(
@@ -162,10 +159,8 @@ def evaluate(
 ) -> Evaluated:
     """Re-fit a model to the training and validation blocks, and score it on the held-out data."""
     cases, blocks = selection.cases, (*TRAIN, *VALIDATION)
-    setup = FitSetup(
-        cases, settings, pools.run, chosen.validation, blocks=blocks, gain=settings.fits.final_gain
-    )
+    setup = FitSetup(cases, settings, pools.run, chosen.validation, blocks=blocks, gain=LAST_GAIN)
     model = fit_candidate(setup, chosen.problem, chosen.solution.theta)
     train = score_on(model.problem, cases, blocks, model.outputs, settings.blocks)
     test = held_out.score_of(model)
-    return Evaluated(model.solution, model.outputs, train, test, settings.intervals)
+    return Evaluated(model.solution, model.outputs, train, test)

@@ -12,10 +12,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rsea_ros.diagnosis.result import Experiment
-from rsea_ros.diagnosis.settings import DEFAULT, NextRunSettings
 from rsea_ros.errors import RseaError
 from rsea_ros.identification.excitation import JOINT, PERIODIC, ExcitationSettings, excitation
 from rsea_ros.identification.problem import Case, Problem
+from rsea_ros.identification.result import AT_NOISE
 from rsea_ros.identification.solver import Solution, bounded_step, jacobian
 from rsea_ros.identification.unknowns import apply, start_vector
 from rsea_ros.model.drive import Drive, drive_from
@@ -29,6 +29,15 @@ SLOWEST, FASTEST = 50.0, 1000.0
 _TRIES, _CLOSER = 4, 0.98
 """How often an amplitude is brought down until a run is allowed; what it stays below the limit by then."""
 _SHOWN = ("position", "velocity", "ft")
+_LENGTH, _PERIOD, _SERIES = 12.0, 4.0, 60.0
+"""s: of a run that separates rivals and of its period, and of one at another amplitude, as long as a usual
+record."""
+_SEPARATES = 0.5
+"""RMS of what a rival cannot follow, over the noise: 3360 samples lie 10 standard deviations above noise."""
+_TOP = 60.0
+"""Hz, of a series of amplitudes: above it the driver's limit of the slew leaves little amplitude."""
+_NEARLY = 0.8
+"""Part of the wanted amplitude that the limits must leave: with less the two are too alike to compare."""
 
 
 @dataclass(frozen=True)
@@ -169,9 +178,7 @@ EXCITATIONS = tuple(
 )
 
 
-def separating_run(
-    accepted: Solution, rivals: Sequence[Solution], rate: float, rule: NextRunSettings = DEFAULT.next_run
-) -> Experiment:
+def separating_run(accepted: Solution, rivals: Sequence[Solution], rate: float) -> Experiment:
     """Return the cheapest allowed run that separates an accepted model from its rivals, if there is one."""
     case = accepted.problem.cases[0]
     undecided = Experiment(
@@ -182,11 +189,11 @@ def separating_run(
     present = float(np.max(np.abs(case.drive.command)))
     rig, most = _model(accepted), 0.0
     for option in sorted(EXCITATIONS, key=lambda c: c.cost):
-        run = allowed_run(rig, case, option.kind, _settings(option, rate, rule), option.relative * present)
+        run = allowed_run(rig, case, option.kind, _settings(option, rate), option.relative * present)
         if run is None:
             continue
         separation = min(_separation(rival, run.case) for rival in rivals)
-        if separation > rule.separation:
+        if separation > _SEPARATES:
             settings = _as_excited(run, rig) | {"separation_times_noise": round(separation, 3)}
             return replace(undecided, reason="separates", separation=separation, excitation=settings)
         most = max(most, separation)
@@ -198,14 +205,12 @@ def unit_of_commands(rig: Rig) -> str:
     return UNITS["command" if rig.loop is None else "reference"]
 
 
-def _settings(
-    option: ExcitationOption, rate: float, rule: NextRunSettings = DEFAULT.next_run
-) -> ExcitationSettings:
+def _settings(option: ExcitationOption, rate: float) -> ExcitationSettings:
     """Return the settings of an option, of any amplitude."""
     rate = playable_rate(rate)
     return ExcitationSettings(
-        rate=rate, duration=rule.duration, amplitude=0.5, noise=0.2 if option.kind == "chirp" else 0.0,
-        low=option.low, high=min(option.high, 0.45 * rate), period=min(4.0, rule.duration), seed=7,
+        rate=rate, duration=_LENGTH, amplitude=0.5, noise=0.2 if option.kind == "chirp" else 0.0,
+        low=option.low, high=min(option.high, 0.45 * rate), period=_PERIOD, seed=7,
     )  # fmt: skip
 
 
@@ -247,9 +252,7 @@ def _remainder(problem: Problem, theta: FloatArray) -> float:
     return float(min(max(rms), np.sqrt(np.mean(residual**2)) * len(rms)))
 
 
-def amplitude_series(
-    model: Solution, times_noise: float, rate: float, rule: NextRunSettings = DEFAULT.next_run
-) -> Experiment | None:
+def amplitude_series(model: Solution, times_noise: float, rate: float) -> Experiment | None:
     """Return the run that shows whether an unexplained residual grows with the amplitude.
 
     times_noise: RMS of that residual over the noise. At half the amplitude it must still be seen; else twice
@@ -257,19 +260,19 @@ def amplitude_series(
     """
     case, rig = model.problem.cases[0], _model(model)
     excess = math.sqrt(max(times_noise**2 - 1.0, 0.0))
-    factors = [f for f in (0.5, 2.0) if math.hypot(1.0, f * excess) >= rule.visible]
+    factors = [f for f in (0.5, 2.0) if math.hypot(1.0, f * excess) >= AT_NOISE]
     if not isinstance(case.drive, Drive):  # it drifts: no simulation predicts how far another run would go
         return Experiment("amplitude_series", amplitude=0.5) if 0.5 in factors else None
     present = float(np.max(np.abs(case.drive.command)))
     for factor in factors:
-        run = allowed_run(rig, case, "multisine", _series(rig, playable_rate(rate), rule), factor * present)
-        if run is not None and run.peak >= rule.nearly * factor * present:
+        run = allowed_run(rig, case, "multisine", _series(rig, playable_rate(rate)), factor * present)
+        if run is not None and run.peak >= _NEARLY * factor * present:
             return Experiment("amplitude_series", amplitude=factor, excitation=_as_excited(run, rig))
     return None
 
 
-def _series(rig: Rig, rate: float, rule: NextRunSettings = DEFAULT.next_run) -> ExcitationSettings:
-    high = min(rule.series_top if rig.loop is None else JOINT.high, 0.45 * rate)
+def _series(rig: Rig, rate: float) -> ExcitationSettings:
+    high = min(_TOP if rig.loop is None else JOINT.high, 0.45 * rate)
     return ExcitationSettings(
-        rate=rate, duration=rule.series_duration, amplitude=0.5, noise=0.0, low=0.1, high=high
+        rate=rate, duration=_SERIES, amplitude=0.5, noise=0.0, low=0.1, high=high
     )

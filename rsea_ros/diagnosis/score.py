@@ -39,9 +39,16 @@ _LOWEST = 2.0
 """Hz: below it a drift may hide the command. But for _SHORTEST, these steer a remark and no verdict."""
 
 
-def missed_response(
-    case: Case, output: FloatArray, channel: str, blocks: IntArray, rule: BlockSettings
-) -> float:
+_FALSE_ALARM, _CLEAR, _ENOUGH = 0.01, 0.3, 16
+"""Of a missed response: probability that noise alone passes for one in any line of a record, which sets the
+least coherence^2 by the number of blocks; coherence^2 above which one is missed, however small, and blocks
+without faulty samples below which none is (with 16 blocks noise alone reaches 0.26 in one line of a
+hundred)."""
+_OWN_ERROR = 0.1
+"""Share of the simulated response up to which an error of it is the simulation's own."""
+
+
+def missed_response(case: Case, output: FloatArray, channel: str, blocks: IntArray) -> float:
     """Return the largest coherence^2 of a residual with the command where the model misses a response, or 0.
 
     blocks: number of the block of each sample of the channel; those with faulty samples are left out.
@@ -50,14 +57,14 @@ def missed_response(
         return 0.0
     u = case.drive.command_at(case.t[channel])
     parts = _segments(blocks, case.mask[channel])
-    if len(parts) < rule.response_blocks:
+    if len(parts) < _ENOUGH:
         return 0.0
     r, y, u_hat = (_spectra(parts, v) for v in (case.measured[channel] - output, output, u))
     coherence = _coherence(r, u_hat)
-    chance = 1.0 - (rule.false_alarm / r.shape[1]) ** (1.0 / (len(parts) - 1))
-    limit = max(rule.response_clear, chance)
+    chance = 1.0 - (_FALSE_ALARM / r.shape[1]) ** (1.0 / (len(parts) - 1))
+    limit = max(_CLEAR, chance)
     error, response = (np.abs(np.sum(v * u_hat.conj(), axis=0)) for v in (r, y))
-    missed = error > rule.response_share * response
+    missed = error > _OWN_ERROR * response
     return float(np.max(np.where(missed & (coherence > limit), coherence, 0.0)))
 
 
@@ -165,7 +172,7 @@ def score(
     """Return the score of simulated outputs on the samples of `cases` (the problem's, otherwise masked)."""
     runs = list(zip(cases, outputs, strict=True))
     missed = [
-        missed_response(c, o["ft"], "ft", blocks_of(c, "ft", rule), rule) for c, o in runs if _has_ft(c, o)
+        missed_response(c, o["ft"], "ft", blocks_of(c, "ft", rule)) for c, o in runs if _has_ft(c, o)
     ]
     sums, counts, run = {}, {}, np.zeros(0, np.int64)
     for n in problem.channels:

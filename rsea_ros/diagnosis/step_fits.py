@@ -29,7 +29,7 @@ from rsea_ros.diagnosis.criteria import is_equally_good, is_far_from_floor, pref
 from rsea_ros.diagnosis.data_split import VALIDATION, short_pieces_of
 from rsea_ros.diagnosis.initial_guess import initial_guesses, stated_starts, view_for
 from rsea_ros.diagnosis.score import Score, score_on
-from rsea_ros.diagnosis.settings import DiagnosisSettings, ForwardSettings
+from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.effects.effect import Effect
 from rsea_ros.effects.guess import Guess
 from rsea_ros.effects.signal_table import ROTOR_ANGLE
@@ -43,6 +43,16 @@ from rsea_ros.records.record import FloatArray
 
 _DAMPING = 1e-6
 """Of the curvature: keeps apart what the data do not. Numerical: far below that of any unknown that shows."""
+_STEPS, _PART = 2, 0.3
+"""Steps of an effect's screening, with old derivatives, and the share of one that is tried where the whole
+one does not lower the cost."""
+_SMALLER = 0.1
+"""Share of a first guess that is tried where two linear steps from it led uphill: a tenth of a typical size
+is nearly linear; without it mild effects were lost."""
+QUICK_FIT = 6
+"""Steps of an effect's first fit to all training blocks."""
+_MOVED = 0.02
+"""Change of what a channel leaves, from which a fit is repeated."""
 
 
 @dataclass(frozen=True)
@@ -61,23 +71,21 @@ class ScreenedEffect:
 
 
 def screen(
-    current: Solution, effect: Effect, guesses: Sequence[dict[str, float]], rule: ForwardSettings
+    current: Solution, effect: Effect, guesses: Sequence[dict[str, float]]
 ) -> ScreenedEffect | None:
     """Return the best of an effect's guesses after two cheap steps; None for an effect the rig cannot have.
 
     A guess may also name values of the rig: these then differ from where the derivatives were taken.
     """
-    best = _best_of(current, effect, guesses, rule)
+    best = _best_of(current, effect, guesses)
     if best is None or best.cost >= current.cost:
-        second = _best_of(current, effect, _other_guesses(effect, guesses, rule.smaller_guess), rule)
+        second = _best_of(current, effect, _other_guesses(effect, guesses))
         best = min((b for b in (best, second) if b is not None), key=lambda b: b.cost, default=None)
     return best
 
 
-def _other_guesses(
-    effect: Effect, guesses: Sequence[Mapping[str, float]], share: float
-) -> list[dict[str, float]]:
-    """Return guesses of a share of their size, where an effect is nearly linear; none without a null size.
+def _other_guesses(effect: Effect, guesses: Sequence[Mapping[str, float]]) -> list[dict[str, float]]:
+    """Return guesses of a tenth of their size, where an effect is nearly linear; none without a null size.
 
     A mode's main parameter, its frequency, is no size: where the peaks of the residual do not show one, its
     typical values are tried.
@@ -88,11 +96,11 @@ def _other_guesses(
     if not math.isfinite(main.null):
         return []
     sized = [guess for guess in guesses if main.name in guess]
-    return [{**guess, main.name: main.null + share * (guess[main.name] - main.null)} for guess in sized]
+    return [{**guess, main.name: main.null + _SMALLER * (guess[main.name] - main.null)} for guess in sized]
 
 
 def _best_of(
-    current: Solution, effect: Effect, guesses: Iterable[Mapping[str, float]], rule: ForwardSettings
+    current: Solution, effect: Effect, guesses: Iterable[Mapping[str, float]]
 ) -> ScreenedEffect | None:
     """Return the best of some guesses."""
     tried_all = []
@@ -102,7 +110,7 @@ def _best_of(
         is_bent = "mode" in effect.tags or base is not current
         try_guess = _with_new_derivatives if is_bent else _with_present_derivatives
         try:
-            tried = try_guess(base, effect, parameters, rule)
+            tried = try_guess(base, effect, parameters)
         except RseaError:
             continue
         if tried is not None:
@@ -117,15 +125,15 @@ def with_values(current: Solution, values: Mapping[str, float]) -> Solution:
 
 
 def _with_new_derivatives(
-    current: Solution, effect: Effect, guess: dict[str, float], rule: ForwardSettings
+    current: Solution, effect: Effect, guess: dict[str, float]
 ) -> ScreenedEffect:
     problem, theta = add_effect(current.problem, current.theta, effect, guess)
-    solution = solve(problem, theta, iterations=rule.screening_steps)
+    solution = solve(problem, theta, iterations=_STEPS)
     return ScreenedEffect(effect, solution.problem, solution.theta, solution.cost)
 
 
 def _with_present_derivatives(
-    current: Solution, effect: Effect, guess: dict[str, float], rule: ForwardSettings
+    current: Solution, effect: Effect, guess: dict[str, float]
 ) -> ScreenedEffect | None:
     """Return where two steps lead; None for an effect that shows in no channel, or that runs away."""
     problem, theta = add_effect(current.problem, current.theta, effect, guess)
@@ -137,8 +145,8 @@ def _with_present_derivatives(
         return None
     step = _Step(problem, np.column_stack([current.jacobian, columns]))
     best = ScreenedEffect(effect, problem, theta, step.cost(theta, residual))
-    for _ in range(rule.screening_steps):
-        better = step.take(best, residual, (1.0, rule.screening_part))
+    for _ in range(_STEPS):
+        better = step.take(best, residual, (1.0, _PART))
         if better is None:
             break
         best, residual = better
@@ -206,7 +214,7 @@ class StepFits:
         if self.is_far:
             problem, theta = without_clocks(with_doubled_step(problem), theta)
         problem = with_unknown_start(problem, theta)
-        return solve(problem, theta, iterations=self.settings.fits.present_iterations)
+        return solve(problem, theta, iterations=5)
 
     @cached_property
     def guesses(self) -> dict[str, list[Guess]]:
@@ -226,7 +234,7 @@ class StepFits:
 
         def try_effect(i: int) -> ScreenedEffect | None:
             self.say(effects[i].name, 0.4 * i / len(effects))
-            return screen(solution, effects[i], guesses[effects[i].name], self.settings.forward)
+            return screen(solution, effects[i], guesses[effects[i].name])
 
         screened = [s for s in self.pools.fits.map(try_effect, range(len(effects))) if s is not None]
         return sorted(screened, key=lambda s: s.cost)
@@ -263,12 +271,12 @@ class StepFits:
         angle contains the motion by every other cause, so such a model counts only where it leaves
         little: otherwise it imitates another missing effect.
         """
-        base, most = self.on_pieces, self.settings.forward.hope_on_angle
+        base = self.on_pieces
         on_angle = replace(base, problem=replace(base.problem, on_angle=True))
         effects = [e for e in self.effects if ROTOR_ANGLE in e.reads and e.name not in base.problem.acting]
-        screened = (screen(on_angle, e, self.guesses[e.name], self.settings.forward) for e in effects)
+        screened = (screen(on_angle, e, self.guesses[e.name]) for e in effects)
         fitted = [self._fit_pieces(s) for s in screened if s is not None]
-        models = [self._fit_all(s) for s in fitted if s.cost < most * base.cost]
+        models = [self._fit_all(s) for s in fitted if s.cost < 0.5 * base.cost]
         return [m for m in models if not is_far_from_floor(m, self.settings)]
 
     def complete(self, screened: ScreenedEffect) -> tuple[Problem, FloatArray]:
@@ -282,8 +290,7 @@ class StepFits:
     def _fit_pieces(self, screened: ScreenedEffect) -> ScreenedEffect:
         self.say(f"fitting {screened.name}", 0.5)
         starts = [screened.theta, *self._from_stated_values(screened)]
-        iterations = self.settings.fits.piece_iterations
-        ends = [solve(screened.problem, start, iterations=iterations) for start in starts]
+        ends = [solve(screened.problem, start) for start in starts]
         best = min(ends, key=lambda s: s.cost)
         return replace(screened, theta=best.theta, cost=best.cost)
 
@@ -295,8 +302,7 @@ class StepFits:
         if not is_off_rig(self.on_pieces):
             return []
         starts = stated_starts(screened.problem, screened.theta, screened.effect)
-        few = self.settings.forward.screening_steps
-        tried = [solve(screened.problem, start, iterations=few) for start in starts]
+        tried = [solve(screened.problem, start, iterations=_STEPS) for start in starts]
         return [min(tried, key=lambda s: s.cost).theta]
 
     def _fit_all(self, screened: ScreenedEffect) -> Candidate:
@@ -315,14 +321,14 @@ class StepFits:
         if not self._has_moved(first):
             return first
         is_quick = is_far_from_floor(first, self.settings)
-        return refit(first, replace(self._setup, iterations=None, is_quick=is_quick))
+        return refit(first, replace(self._setup, iterations=FitSetup.iterations, is_quick=is_quick))
 
     @property
     def _setup(self) -> FitSetup:
         """How effects are fitted beside the current model."""
         return FitSetup(
             self.current.cases, self.settings, self.pools.run, self.current.validation,
-            iterations=self.settings.fits.full_iterations, is_quick=self.is_far,
+            iterations=QUICK_FIT, is_quick=self.is_far,
         )  # fmt: skip
 
     def _surely_helps(self, screened: ScreenedEffect) -> bool:
@@ -353,4 +359,4 @@ class StepFits:
         """Return whether a model leaves much more or less of a channel than the current one, its weight."""
         scores, channels = (model.validation, self.current.validation), model.validation.sums
         now, before = (np.array([max(s.ratio(n), 1.0) for n in channels]) for s in scores)
-        return bool(np.any(np.abs(now / before - 1.0) > self.settings.forward.moved))
+        return bool(np.any(np.abs(now / before - 1.0) > _MOVED))

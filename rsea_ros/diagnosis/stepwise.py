@@ -35,9 +35,19 @@ from rsea_ros.effects.effect import Effect
 from rsea_ros.identification.confidence import is_off_rig
 from rsea_ros.identification.problem import Problem
 from rsea_ros.identification.solver import Pools, Solution
-from rsea_ros.identification.unknowns import vector_of
+from rsea_ros.identification.unknowns import LOOP_CLOCK, theta_with, vector_of
 from rsea_ros.model.rig import Rig
 from rsea_ros.progress import Progress
+
+_HOPE, _HOPE_OF_TWO = 0.98, 0.9
+"""Of the current cost on pieces: no hope above it, of one effect and of two."""
+_NEXT = 1.1
+"""Of the best cost on pieces: how close those after the first few must be."""
+_ALIKE = 0.02
+"""Of the loss: a rival so close is refused for its size, not its fit."""
+_PAIRED, _PAIR_FITS = 3, 2
+"""Effects with which pairs begin, and partners that each is tried with; pairs that are fitted to all training
+blocks."""
 
 
 class StepResult(NamedTuple):
@@ -110,10 +120,10 @@ class ForwardStep:
             return []
         best, alike = close[0].cost, _look_alikes(close[0].effect, self.effects)
         if self.fits.is_far:
-            close = [s for s in close if s.cost < rule.hope_one * cost] or close[:1]
+            close = [s for s in close if s.cost < _HOPE * cost] or close[:1]
         first, following = close[: rule.full_fits], close[rule.full_fits : 2 * rule.full_fits]
         near = [s for s in first if s.cost < rule.behind_first * best]
-        near += [s for s in following if s.cost < rule.behind_next * best]
+        near += [s for s in following if s.cost < _NEXT * best]
         fitted = {s.name: s for s in close}
         rivals = {s.name: s for s in (*reversed(screened), *close) if s.name in alike}
         rivals = {name: s for name, s in rivals.items() if name not in {n.name for n in near}}
@@ -133,25 +143,25 @@ class ForwardStep:
 
         Where two effects are missing, a third may fit as well alone, but only far from the rig.
         """
-        rule, most = self.settings.forward, self.settings.forward.clear * self.fits.on_pieces.cost
+        most = 0.5 * self.fits.on_pieces.cost
         away = {s.name: prior_cost(s.problem, s.theta) for s in close if s.cost < most}
-        nearer = [s for s in close if away.get(s.name, math.inf) < rule.nearer * chosen.prior_cost]
+        nearer = [s for s in close if away.get(s.name, math.inf) < 0.5 * chosen.prior_cost]
         return self._pairs_beside(sorted(nearer, key=lambda s: away[s.name]), self.fits.with_fitted)
 
     def _pairs_beside(
         self, firsts: Sequence[ScreenedEffect], with_first: Callable[[ScreenedEffect], Solution]
     ) -> list[Candidate]:
         """Return acceptable models with an effect beside one of the first. with_first: on the pieces."""
-        rule, fits = self.settings.forward, self.fits
-        if len(self.current.causes) > rule.causes_beside_a_pair:
+        fits = self.fits
+        if len(self.current.causes) > 1:  # beside more of them, a pair fits whatever is left
             return []
         pairs: list[ScreenedEffect] = []
-        for first in firsts[: rule.paired]:
-            pairs += fits.fit_pieces(fits.screen(with_first(first))[: rule.paired])
+        for first in firsts[: _PAIRED]:
+            pairs += fits.fit_pieces(fits.screen(with_first(first))[: _PAIRED])
         promising = sorted(
-            (p for p in pairs if p.cost < rule.hope_two * fits.on_pieces.cost), key=lambda p: p.cost
+            (p for p in pairs if p.cost < _HOPE_OF_TWO * fits.on_pieces.cost), key=lambda p: p.cost
         )
-        return self._acceptable(fits.fit_all(promising[: rule.paired_fits]))
+        return self._acceptable(fits.fit_all(promising[: _PAIR_FITS]))
 
     def _far_behind(self, screened: ScreenedEffect) -> Trial:
         problem, theta = self.fits.complete(screened)
@@ -163,7 +173,7 @@ class ForwardStep:
         if refused is not None or chosen is None:
             return trial_of(model, model.newest, self.current, refused or "not_sure")
         loss = float(chosen.validation.loss(chosen.validation).sum())
-        is_alike = loss_excess(model, chosen) < self.settings.forward.alike * loss
+        is_alike = loss_excess(model, chosen) < _ALIKE * loss
         is_larger = model.parameters > chosen.parameters and is_alike
         reason: Reason = "no_better_than_simpler" if is_larger else "explains_less"
         if loss_excess(model, chosen) < 0.0 and model.prior_cost > chosen.prior_cost:
@@ -214,9 +224,17 @@ def select_stepwise(
 
 
 def _fit_nominal(nominal: Problem, setup: FitSetup, start: Rig | None) -> Candidate:
-    """Fit the nominal model, and again with the noise that its residual shows."""
+    """Fit the nominal model, and again with the noise that its residual shows.
+
+    A loop's torque is constant over a tick, and so is its residual over a clock: both conventions are starts.
+    """
     theta = vector_of(nominal.unknowns, start) if start else None
-    first = fit_candidate(replace(setup, iterations=setup.settings.fits.first_iterations), nominal, theta)
+    longer = replace(setup, iterations=25)
+    first = fit_candidate(longer, nominal, theta)
+    own = {u.name: u.doubt for u in nominal.unknowns if u.name == LOOP_CLOCK}
+    if own:
+        other = fit_candidate(longer, nominal, theta_with(nominal.unknowns, first.solution.theta, own))
+        first = min(first, other, key=lambda m: m.solution.cost)
     return refit(with_noise_reestimated(first), setup)
 
 

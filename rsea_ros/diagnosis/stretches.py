@@ -29,6 +29,9 @@ from rsea_ros.records.record import BoolArray, FloatArray, IntArray
 
 _ROUNDING = 1e-6
 """Of a slot: so much less is a whole one."""
+_DECAYS = 4.0
+"""Time constants of the rig's slowest motion that a run-up lasts: after 3 a sound rig with two swinging ends
+is at its floor."""
 _LASTS = 1e-5
 """Share of a motion that a step takes away, from which it ends within a record: 45 s."""
 
@@ -54,7 +57,7 @@ def in_stretches(problem: Problem, settings: DiagnosisSettings, run: Map) -> Pro
 def settings_for(rig: Rig, settings: DiagnosisSettings) -> DiagnosisSettings:
     """Return settings with a run-up in which a rig forgets its start, and slots that are no shorter."""
     rule = settings.stretches
-    run_up = max(rule.run_up, rule.decays * slowest_decay(rig))
+    run_up = max(rule.run_up, _DECAYS * slowest_decay(rig))
     fours = math.ceil(max(run_up / settings.blocks.longest, rule.blocks) / 4)
     return replace(settings, stretches=replace(rule, run_up=run_up, blocks=4 * fours))
 

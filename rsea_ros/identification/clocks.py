@@ -33,7 +33,6 @@ import numpy as np
 from rsea_ros.identification.confidence import Confidence, inverse_of, sample_blocks
 from rsea_ros.identification.problem import Problem
 from rsea_ros.identification.result import Remark
-from rsea_ros.identification.settings import INTERVALS
 from rsea_ros.identification.solver import Map, Solution, clock_columns, serial, solve
 from rsea_ros.identification.unknowns import FASTEST, Unknown, clock_rates, clocks, start_vector
 from rsea_ros.model.inverse import is_inverse
@@ -164,7 +163,7 @@ def required_clocks(solution: Solution) -> RequiredClocks:
     free = {u.name for u in problem.unknowns}
     fixed = [u for u in (*clocks(channels, problem.rig), *clock_rates(channels)) if u.name not in free]
     columns = clock_columns(problem, solution.theta, fixed)
-    blocks = sample_blocks(problem, INTERVALS.block)
+    blocks = sample_blocks(problem, BLOCK)
     chosen: list[int] = []
     for _ in fixed:
         rest = [i for i in range(len(fixed)) if i not in chosen]

@@ -23,7 +23,6 @@ from rsea_ros.identification.result import (
     Remark,
     shares_from_data,
 )
-from rsea_ros.identification.settings import INTERVALS, IntervalSettings
 from rsea_ros.identification.solver import Map, Solution, central_jacobian, serial
 from rsea_ros.identification.unknowns import Unknown, apply
 from rsea_ros.model.drive import Drive
@@ -62,9 +61,14 @@ class Confidence:
         return result
 
 
-def confidence_of(
-    solution: Solution, run: Map = serial, rule: IntervalSettings = INTERVALS
-) -> Confidence:
+BLOCK = 1.0
+"""s: residuals further apart are taken as independent, longer than a bench's memory."""
+_MOST_CORRECTED = 4.0
+"""Largest factor n / (n - p) on the variance, for n blocks and p unknowns, an interval twice as wide: with
+fewer than 4/3 p blocks the factor runs away."""
+
+
+def confidence_of(solution: Solution, run: Map = serial) -> Confidence:
     """Return the doubt that is left after a fit."""
     doubt = np.array([u.reach for u in solution.problem.unknowns])
     prior = np.diag(1.0 / doubt**2)
@@ -73,7 +77,7 @@ def confidence_of(
         solution = replace(solution, jacobian=central_jacobian(solution.problem, solution.theta, run))
         information = solution.jacobian.T @ solution.jacobian
     inverse = inverse_of(information + prior)
-    spread = inverse @ np.hstack([_block_scores(solution, rule).T, np.sqrt(prior)])
+    spread = inverse @ np.hstack([_block_scores(solution).T, np.sqrt(prior)])
     covariance = spread @ spread.T  # no rounding makes a variance of this product negative
     least = np.diag(inverse) * max(_alike(case) for case in solution.problem.cases)
     least = np.minimum(least, np.maximum(np.diag(inverse), doubt**2))
@@ -102,12 +106,12 @@ def _alike(case: Case) -> float:
     return 1.0 if isinstance(drive, Drive) else max(1.0, 0.5 / (CUT_OFF * float(drive.t[1] - drive.t[0])))
 
 
-def _block_scores(solution: Solution, rule: IntervalSettings) -> FloatArray:
+def _block_scores(solution: Solution) -> FloatArray:
     """Return the score of each block, shape (blocks, unknowns): S'S is the scatter of their sum."""
-    blocks = sample_blocks(solution.problem, rule.block)
+    blocks = sample_blocks(solution.problem, BLOCK)
     scores = sum_by_block(solution.jacobian, solution.residual, blocks)
     counted = len(np.unique(blocks))
-    free = max(counted - len(solution.theta), counted / rule.most_corrected)
+    free = max(counted - len(solution.theta), counted / _MOST_CORRECTED)
     result: FloatArray = scores * np.sqrt(counted / free)
     return result
 

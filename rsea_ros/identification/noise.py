@@ -14,7 +14,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.fft import irfft, rfft
 
-from rsea_ros.identification.settings import NOISE, NoiseSettings
 from rsea_ros.model.rig import Sensor
 from rsea_ros.records.record import BoolArray, Channel, ComplexArray, FloatArray, IntArray, Record
 from rsea_ros.records.statistics import hann, segment_spectra
@@ -109,27 +108,39 @@ _LONGEST, _SEGMENTS = 512, 8
 _FEWEST = 64
 _ROUNDING = 1e-9
 """Of a channel's standard deviation: less than this is rounding, not noise."""
+_TOP = (0.62, 0.98)
+"""Of half the rate, between which noise is read off: what follows the command is taken away, and a
+torque-driven actuator hardly moves there."""
+_FLAT = 2.0
+"""Ratio of the powers of the two halves of that band up to which it is flat: a filter of second order makes
+2.5."""
+_SLOWER = 0.9
+"""Of the command's rate: of a slower channel the rig's statement counts, the command's upper half is folded
+over the band."""
+_FILTERED = 0.1
+"""Of the noise that a rig states, the least that is believed: less is a filter's work, not a better
+sensor's."""
 
 
-def noise_floor(record: Record, name: str, sensor: Sensor, rule: NoiseSettings = NOISE) -> float:
+def noise_floor(record: Record, name: str, sensor: Sensor) -> float:
     """Return the RMS of a channel's noise, in its unit: white noise with the level at the top of the band.
 
     sensor: as the rig states it; its statement counts where the record does not show the noise.
     """
     channel = record[name]
     t, y = (values[np.isfinite(channel.y) & np.isfinite(channel.t)] for values in (channel.t, channel.y))
-    least = least_noise(y, sensor, rule)
+    least = least_noise(y, sensor)
     stated = sensor.level
     if len(y) < _FEWEST:
         return max(float(np.std(np.diff(y, 2))) / math.sqrt(6.0) if len(y) > 3 else 0.0, stated, least)
-    if stated > 0.0 and record[name].rate < rule.slower * record["command"].rate:
+    if stated > 0.0 and record[name].rate < _SLOWER * record["command"].rate:
         return max(stated, least)
     unlike = _unlike(record["command"], t, y)
-    level = math.sqrt(float(np.median(unlike[_top(unlike, rule)])))
-    return max(level, least) if _is_flat(unlike, rule) else max(level, stated, least)
+    level = math.sqrt(float(np.median(unlike[_top(unlike)])))
+    return max(level, least) if _is_flat(unlike) else max(level, stated, least)
 
 
-def least_noise(values: FloatArray, sensor: Sensor, rule: NoiseSettings = NOISE) -> float:
+def least_noise(values: FloatArray, sensor: Sensor) -> float:
     """Return the least noise of a channel: no model has to fit better.
 
     Half the rig's quantum, or where the values come in steps larger than that, q / sqrt(12) of those; and a
@@ -137,20 +148,18 @@ def least_noise(values: FloatArray, sensor: Sensor, rule: NoiseSettings = NOISE)
     """
     step = step_of(values)
     coarse = step / math.sqrt(12.0) if step > sensor.quantum else 0.0
-    stated = max(0.5 * sensor.quantum, 0.0 if sensor.filter else rule.filtered * sensor.noise)
+    stated = max(0.5 * sensor.quantum, 0.0 if sensor.filter else _FILTERED * sensor.noise)
     return max(stated, coarse, _ROUNDING * float(np.std(values)), _TINY)
 
 
-def top_of_band(
-    values: FloatArray, seams: Sequence[int] | IntArray = (), rule: NoiseSettings = NOISE
-) -> tuple[float, bool]:
+def top_of_band(values: FloatArray, seams: Sequence[int] | IntArray = ()) -> tuple[float, bool]:
     """Return the RMS of white noise as high as the top of the band of values, and whether that is flat.
 
     seams: samples before which values are missing. A jump there would pass for noise.
     """
     spectra = unit_spectra(values, _LONGEST, _SEGMENTS)
     power = np.mean(np.abs(spectra[_seamless(spectra, seams)]) ** 2, axis=0)
-    return math.sqrt(float(np.median(power[_top(power, rule)]))), _is_flat(power, rule)
+    return math.sqrt(float(np.median(power[_top(power)]))), _is_flat(power)
 
 
 def _seamless(spectra: ComplexArray, seams: Sequence[int] | IntArray) -> BoolArray:
@@ -171,16 +180,16 @@ def _unlike(command: Channel, t: FloatArray, y: FloatArray) -> FloatArray:
     return np.asarray(np.maximum(power - shared, 0.0) / (1.0 - 1.8 / max(2.0, len(v))))
 
 
-def _is_flat(power: FloatArray, rule: NoiseSettings) -> bool:
+def _is_flat(power: FloatArray) -> bool:
     """Return whether both halves of the top of the band have about the same power; one line is not enough."""
-    top = power[_top(power, rule)]
+    top = power[_top(power)]
     if len(top) < 2:
         return False
     lower, upper = (float(np.median(half)) for half in np.array_split(top, 2))
-    return max(lower, upper) <= rule.flat * max(min(lower, upper), _TINY)
+    return max(lower, upper) <= _FLAT * max(min(lower, upper), _TINY)
 
 
-def _top(lines: FloatArray, rule: NoiseSettings) -> slice:
+def _top(lines: FloatArray) -> slice:
     """Return where the top of the band lies: one line at least."""
-    first, last = math.ceil(rule.top_from * len(lines)), math.floor(rule.top_to * len(lines))
+    first, last = math.ceil(_TOP[0] * len(lines)), math.floor(_TOP[1] * len(lines))
     return slice(first, max(last, first + 1))

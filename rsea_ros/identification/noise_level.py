@@ -7,7 +7,7 @@ only where it exceeds its white part by more than the doubt of that part, which 
 Sensor noise is stationary; its spectrum falls with frequency and is flat below what a block of a second
 resolves; whitened, it is nearly Gaussian; and it is independent of the command, of the motion, and of
 other sensors. A residual that passes all of these tests is noise, however large; one that fails in any point
-is a misfit. The limits (settings.py) were set between noise of first order with a memory of up to
+is a misfit. The limits were set between noise of first order with a memory of up to
 0.25 s and mild effects, inside and outside the catalogue, of the second bench in test/independent.
 
 The command; laws of friction, play, springs, ripple and drift over the simulated motion; and the
@@ -30,7 +30,6 @@ from rsea_ros.identification.noise import (
     unit_spectra,
 )
 from rsea_ros.identification.problem import Case
-from rsea_ros.identification.settings import NOISE, NoiseSettings
 from rsea_ros.model.drive import Drive
 from rsea_ros.records.record import ComplexArray, FloatArray, IntArray
 
@@ -78,12 +77,22 @@ _LONG, _SHORT = 1024, 512
 _STEADY_BANDS = (0.4, 3.0, 10.0, 40.0)
 _SHARED_BANDS = (0.4, 4.0, 14.0, 50.0)
 """Hz, lower ends; the last band ends below the Nyquist frequency."""
+_ABOVE, _SURE = 1.04, 4.0
+"""RMS of a residual over the noise above which it may be coloured (as floor.only_noise), and standard
+deviations of the white part above which it is: chance reaches 4 in one of 30 000 channels."""
+_FEWEST = 1500
+"""Samples from which coloured noise is looked for: of fewer, noise and misfit look alike."""
+_OFF, _UNSTEADY, _SHARED, _SLOW, _LASTING, _SPIKY = 5.0, 4.0, 0.2, 6.0, 0.1, 1.0
+"""A residual is noise, however large, below all of these: standard deviations of a band off a falling
+spectrum (noise reaches 3.5 in 300 records); variance of the power over time, over that of stationary noise
+(2.3); share of a band's power coherent with another signal (chance 0.17, effects 0.9); power density below
+0.25 Hz over that from 0.3 to 1 Hz (3); share of a constant and a trend (0.03, a drift has most); excess
+kurtosis (0.1, knocks over 10)."""
 
 
 def is_noise(
-    case: Case, outputs: Mapping[str, FloatArray], channel: str, ratio: float = 1.0,
-    rule: NoiseSettings = NOISE,
-) -> bool:  # fmt: skip
+    case: Case, outputs: Mapping[str, FloatArray], channel: str, ratio: float = 1.0
+) -> bool:
     """Return whether the residual of a channel is noise of its sensor, coloured or not.
 
     outputs: of the fitted model, by channel. ratio: of the gear, rotor over output.
@@ -91,20 +100,20 @@ def is_noise(
     """
     span = _span(case, channel)
     residual = residual_of(case, outputs, channel)[span]
-    if len(residual) < rule.fewest or not np.any(residual):
+    if len(residual) < _FEWEST or not np.any(residual):
         return False
     rate = 1.0 / float(np.median(np.diff(case.t[channel])))
-    if _lasting_share(residual) > rule.lasting or _slow(residual, rate) > rule.slow:
+    if _lasting_share(residual) > _LASTING or _slow(residual, rate) > _SLOW:
         return False
     spectra = _as_made(case, channel, unit_spectra(residual, _LONG, 8))
     shape = shape_of(spectra)
-    if shape.off > rule.shape or _unsteady(spectra, shape, rate) > rule.unsteady:
+    if shape.off > _OFF or _unsteady(spectra, shape, rate) > _UNSTEADY:
         return False
-    if _kurtosis(shape, residual) > rule.spiky:
+    if _kurtosis(shape, residual) > _SPIKY:
         return False
     short_spectra = unit_spectra(residual, _SHORT, 16)
     others = (unit_spectra(w[span], _SHORT, 16) for w in witnesses(case, outputs, channel, ratio))
-    return all(_coherent_share(short_spectra, other, rate) < rule.shared for other in others)
+    return all(_coherent_share(short_spectra, other, rate) < _SHARED for other in others)
 
 
 def residual_of(case: Case, outputs: Mapping[str, FloatArray], channel: str) -> FloatArray:
@@ -192,9 +201,7 @@ _BLOCK = 1.0
 """s. Coloured noise is independent from one such block to the next."""
 
 
-def reestimate_noise(
-    case: Case, outputs: Mapping[str, FloatArray], ratio: float = 1.0, rule: NoiseSettings = NOISE
-) -> Case:
+def reestimate_noise(case: Case, outputs: Mapping[str, FloatArray], ratio: float = 1.0) -> Case:
     """Return a case with its noise from a fitted model's residual.
 
     outputs: simulated, by channel. ratio: of the gear, rotor over output, for ripple. Coloured noise is taken
@@ -206,15 +213,15 @@ def reestimate_noise(
     noise = dict(case.noise)
     for n in channels:
         span = _span(case, n)
-        white, is_white = top_of_band(residuals[n][span], _seams(case, n) - span.start, rule)
+        white, is_white = top_of_band(residuals[n][span], _seams(case, n) - span.start)
         white /= float(np.sqrt(np.mean(case.mask[n][span])))  # what does not count in between is zero
         level = white if is_white and isinstance(case.drive, Drive) else rms[n]  # a Motion is filtered
         noise[n] = max(min(noise[n], level), case.least.get(n, 0.0))
-    above = [n for n in channels if rms[n] > rule.above * noise[n]]
-    if not above or not all(is_noise(case, outputs, n, ratio, rule) for n in above):
+    above = [n for n in channels if rms[n] > _ABOVE * noise[n]]
+    if not above or not all(is_noise(case, outputs, n, ratio) for n in above):
         return replace(case, noise=noise, coloured=frozenset())
-    chance = {n: rule.sure * _WHITE_DOUBT / float(np.sqrt(np.count_nonzero(case.mask[n]))) for n in above}
-    coloured = frozenset(n for n in above if rms[n] > max(rule.above, 1.0 + chance[n]) * noise[n])
+    chance = {n: _SURE * _WHITE_DOUBT / float(np.sqrt(np.count_nonzero(case.mask[n]))) for n in above}
+    coloured = frozenset(n for n in above if rms[n] > max(_ABOVE, 1.0 + chance[n]) * noise[n])
     for n in above:
         noise[n] = rms[n] * (1.0 + 2.0 * _doubt(case, residuals[n], n) if n in coloured else 1.0)
     return replace(case, noise=noise, coloured=coloured)

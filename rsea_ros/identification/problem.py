@@ -11,7 +11,6 @@ import numpy as np
 
 from rsea_ros.errors import IdentificationError
 from rsea_ros.identification.noise import least_noise, noise_floor, top_of_band
-from rsea_ros.identification.settings import NOISE, NoiseSettings
 from rsea_ros.identification.unknowns import Clocks, Unknown, apply
 from rsea_ros.model.drive import Drive, SpringStart, outside_gaps, zero_unknown
 from rsea_ros.model.extent import SKIPPED_START
@@ -87,16 +86,15 @@ def case_from(
     record: Record,
     rig: Rig,
     masked: Mapping[str, BoolArray] | None = None,
-    rule: NoiseSettings = NOISE,
 ) -> Case:
     """Make a record ready.
 
-    masked: samples by channel that are faulty and must not count. rule: of the noise that the record shows.
+    masked: samples by channel that are faulty and must not count.
     Raises IdentificationError when no channel of the record is one that the rig has.
     """
     rig = rig.under(record.source)
     if is_inverse(rig):
-        return _inverse_case(_without_long_faults(record, masked or {}), rig, rule)
+        return _inverse_case(_without_long_faults(record, masked or {}), rig)
     record = with_command(record, rig)
     channels = channels_that_tell(record, rig)
     beside = [n for n in record.channels if n not in OUTPUTS]
@@ -112,12 +110,12 @@ def case_from(
         drive=drive_of(record, rig),
         t=MappingProxyType({n: record[n].t for n in channels}),
         measured=MappingProxyType({n: record[n].y for n in channels}),
-        noise=MappingProxyType({n: noise_floor(heard, n, sensors[n], rule) for n in channels}),
+        noise=MappingProxyType({n: noise_floor(heard, n, sensors[n]) for n in channels}),
         mask=MappingProxyType(counts),
         source=record.source,
         floating=floating,
         filters=rig.filters(),
-        least=MappingProxyType({n: least_noise(heard[n].y, sensors[n], rule) for n in channels}),
+        least=MappingProxyType({n: least_noise(heard[n].y, sensors[n]) for n in channels}),
     )
 
 
@@ -154,7 +152,7 @@ def channels_that_tell(record: Record, rig: Rig) -> list[str]:
     )
 
 
-def _inverse_case(record: Record, rig: Rig, rule: NoiseSettings) -> Case:
+def _inverse_case(record: Record, rig: Rig) -> Case:
     """Make a record that is judged along its measured motion ready: its torques against those that it takes.
 
     Noise: the part that passes the filter of the white noise at the top of a torque's band, or
@@ -171,7 +169,7 @@ def _inverse_case(record: Record, rig: Rig, rule: NoiseSettings) -> Case:
     known = {"motor_torque": torque, **{n: record[n] for n in judged if n != "motor_torque"}}
     return Case(
         drive=motion, t=dict.fromkeys(judged, motion.t), measured=judged,
-        noise={n: _filtered_noise(known[n], rig.sensors.get(n, Sensor()), rule) for n in judged},
+        noise={n: _filtered_noise(known[n], rig.sensors.get(n, Sensor())) for n in judged},
         mask=dict.fromkeys(judged, motion.counts), source=record.source,
         floating=frozenset([*judged][-1:] if len(motion.d) and rig.zero_unknown("deflection") else ()),
     )
@@ -192,8 +190,8 @@ _LONG = 5
 """Samples in a row."""
 
 
-def _filtered_noise(torque: Channel, sensor: Sensor, rule: NoiseSettings) -> float:
-    level, is_flat = top_of_band(torque.y, rule=rule)
+def _filtered_noise(torque: Channel, sensor: Sensor) -> float:
+    level, is_flat = top_of_band(torque.y)
     noise = max(level, 0.0 if is_flat else sensor.noise) * math.sqrt(min(1.0, 2.0 * CUT_OFF / torque.rate))
     return max(noise, 1e-6 * float(np.std(torque.y)), 1e-300)
 

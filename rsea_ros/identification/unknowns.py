@@ -18,6 +18,7 @@ TURN = 2.0 * math.pi
 CLOCK, CLOCK_RATE = "clock", "clock_rate"
 CLOCK_REACH = 3.0
 """Sigmas that a fit may move a clock."""
+LOOP_CLOCK = "clock.motor_torque"
 RATE_DOUBT, FASTEST = 50.0, 500.0
 """ppm, one sigma and bound. How much faster the clock of a sensor may run: cheap crystals differ by 100."""
 
@@ -194,8 +195,14 @@ def idle(effect: Effect, rig: Rig) -> frozenset[str]:
 
 
 def clocks(channels: Iterable[str], rig: Rig) -> tuple[Unknown, ...]:
-    """Return the clock errors of sensors, s: measured later than stamped when positive."""
-    doubts = {c: rig.clock_doubt(c) for c in channels if c != "motor_torque"}
+    """Return the clock errors of sensors, s: measured later than stamped when positive.
+
+    They count from a motor's torque that follows the command. A loop makes its own: a log may hold that of
+    its own frame or of the one before.
+    """
+    tick = rig["controller.sample_time"] if rig.loop is not None else 0.0
+    doubts = {c: tick if c == "motor_torque" else rig.clock_doubt(c) for c in channels}
+    doubts = {c: d for c, d in doubts.items() if d > 0.0}
     return tuple(
         Unknown(f"{CLOCK}.{c}", 0.0, "s", -CLOCK_REACH * d, CLOCK_REACH * d, False, d, d)
         for c, d in doubts.items()

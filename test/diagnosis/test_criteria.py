@@ -203,12 +203,12 @@ def test_every_channel_must_reach_the_floor(ratios, reached):
 
 def test_every_setting_has_meaning_unit_and_reason_and_its_curve_on_the_page_that_it_points_to():
     settings = list(DEFAULT.numbers())
-    assert len({s.name for s in settings}) == len(settings) > 35
+    assert len({s.name for s in settings}) == len(settings) < 40
     assert all(s.meaning and s.unit and s.reason for s in settings)
     sections = PAGE.read_text(encoding="utf-8").split("\n## ")[1:]
     curves = {section.split("\n")[0]: section for section in sections}
     pointing = {s.name: s for s in settings if "docs/settings.md" in s.reason}
-    assert curves.keys() == pointing.keys() and len(curves) == 9
+    assert curves.keys() == pointing.keys() and len(curves) == 8
     for name, setting in pointing.items():
         assert f"| **{setting.value:g}** |" in curves[name], name
         assert ("Flat:" in curves[name]) == setting.reason.startswith("flat"), name

@@ -41,8 +41,11 @@ def test_friction_and_a_delay_of_the_targets_are_named():
     assert any("cannot determine the play in the gear" in s for s in remark_sentences(diagnosis.remarks))
 
 
-def log_frames() -> Record:
-    """Return 8 s of a joint with friction that follows MIT frames at 200 Hz, firmware at 1 kHz, by RK2."""
+def log_frames(own: bool | None = None) -> Record:
+    """Return 8 s of a joint with friction that follows MIT frames at 200 Hz, firmware at 1 kHz, by RK2.
+
+    own: its motor torque is logged, that of the same frame or of the one before.
+    """
     t = 0.005 * np.arange(1600)
     w = 2.0 * np.pi * np.array([[0.4], [2.1], [7.0]])
     sizes = np.array([[0.5], [0.2], [0.05]])
@@ -52,16 +55,22 @@ def log_frames() -> Record:
     def acceleration(speed: float) -> float:
         return (u - 0.2 * speed - 0.15 * np.tanh(speed / 2e-3)) / 0.038
 
-    q, v, h, shown = 0.0, 0.0, 2e-4, []
+    u, q, v, h, shown, held = 0.0, 0.0, 0.0, 2e-4, [], []
     for angle, rate, torque in zip(angles, rates, torques, strict=True):
         shown.append(q)
+        before = u
         for k in range(25):
             if k % 5 == 0:
                 u = 30.0 * (angle - q) + 0.8 * (rate - v) + torque
+            if k == 0:
+                held.append((before, u))
             middle = v + 0.5 * h * acceleration(v)
             q, v = q + h * middle, v + h * acceleration(middle)
-    noisy = np.array(shown) + 2e-4 * np.random.default_rng(3).standard_normal(len(t))
+    noise = np.random.default_rng(3)
+    noisy = np.array(shown) + 2e-4 * noise.standard_normal(len(t))
     channels = {"reference": angles, "reference_velocity": rates, "command": torques, "position": noisy}
+    if own is not None:
+        channels["motor_torque"] = np.array(held)[:, int(own)] + 0.02 * noise.standard_normal(len(t))
     return Record({n: Channel(t, y) for n, y in channels.items()}, source="frames")
 
 
@@ -72,6 +81,18 @@ def test_friction_of_a_joint_that_follows_mit_frames_is_named_with_its_size():
     low, high = cause.parameters["torque"].ci95
     assert (found.verdict, cause.name, cause.status) == ("explained", "coulomb_friction", "confirmed")
     assert low < 0.15 < high < 0.16
+
+
+@pytest.mark.parametrize("own", [False, True])
+def test_a_log_with_the_torque_of_its_own_frame_has_no_other_cause(own):
+    """It was an encoder that is read a tick late, `confirmed`, or an overshoot of the current."""
+    tried = {*TRIED, "encoder_delay", "current_loop_overshoot"} - {"backlash", "stribeck_friction"}
+    settings = DiagnosisSettings(without=tuple(n for n in catalogue() if n not in tried))
+    rig = rigid(load_rig("pd_joint"), "mit", k_p=30.0, k_d=0.8)
+    found = diagnose([log_frames(own)], rig, settings=settings)
+    assert [(c.name, c.status) for c in found.causes] == [("coulomb_friction", "confirmed")]
+    (clock,) = (p.value for p in found.extended if p.name == "clock.motor_torque")
+    assert (clock > 0.4e-3) is own
 
 
 def rigid(rig: Rig, kind: str, **gains: float) -> Rig:

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from scripted_scores import model
 
+from rsea_ros.diagnosis import next_experiment
 from rsea_ros.diagnosis.criteria import break_tie, refusal
 from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.diagnosis.score import likelier_by
-from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings, NextRunSettings
+from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.identification.excitation import ExcitationSettings, chirp
 from rsea_ros.identification.unknowns import Unknown, with_effect
@@ -75,7 +76,7 @@ def test_a_rig_that_is_wrong_decides_between_no_two_causes():
     assert {named.name, *(a.name for a in found.alternatives)} == {cause, rival}
 
 
-def test_what_came_later_does_not_decide_between_two_causes_either():
+def test_what_came_later_does_not_decide_between_two_causes_either(monkeypatch):
     """Beside friction and an F/T sensor 6 ms late it was "confirmed" at 0.93, the F/T's gain at 0.07.
 
     The two were weighed beside the model of their step, which lacked the delay. The stated stiffness (5 %)
@@ -90,8 +91,8 @@ def test_what_came_later_does_not_decide_between_two_causes_either():
     late = Channel(run["ft"].t + 6e-3, run["ft"].y)
     record = Record({"command": run["command"], "position": run["position"], "ft": late}, "late")
     tried = {"torque_constant_error", "ft_gain_error", "ft_delay", "ft_sensor_lag", "coulomb_friction"}
-    brief = NextRunSettings(duration=4.0)  # of the run that would decide, which is not asked for here
-    settings = DiagnosisSettings(without=frozenset(catalogue()) - tried, next_run=brief)
+    monkeypatch.setattr(next_experiment, "_LENGTH", 4.0)  # of the run that would decide: not asked for here
+    settings = DiagnosisSettings(without=frozenset(catalogue()) - tried)
     found = diagnose([record], stated, settings=settings)
     status = {c.name: c.status for c in found.causes}
     assert status == {

@@ -13,7 +13,6 @@ from rsea_ros.diagnosis.next_experiment import (
     allowed_run,
     amplitude_series,
 )
-from rsea_ros.diagnosis.settings import NextRunSettings
 from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.identification.problem import Problem, case_from
 from rsea_ros.identification.solver import Solution
@@ -133,15 +132,6 @@ def test_an_impossible_run_is_not_recommended():
     rig = load_rig("paper_high_impedance")
     uneven = ExcitationSettings(rate=280.03, duration=12.0, noise=0.0)
     assert allowed_run(rig, like(rig), "multisine", uneven, 20.0) is None
-
-
-@pytest.mark.parametrize("duration", [1.0, 3.0])
-def test_a_run_shorter_than_the_usual_period_has_one_period(duration):
-    rig = load_rig("paper_high_impedance")
-    for option in EXCITATIONS:
-        settings = _settings(option, RATE, NextRunSettings(duration=duration))
-        run = allowed_run(rig, like(rig), option.kind, settings, 20.0)
-        assert run is not None and settings.period == duration
 
 
 @pytest.mark.parametrize(

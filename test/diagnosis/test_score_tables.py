@@ -240,7 +240,7 @@ def driven(count, error, *, rate=100.0, bad=()):
 def test_a_response_is_missed_from_a_tenth_of_it_on(share, noise, blocks, bad, missed):
     """Coherence^2 of what is left with the command; 16 sound blocks are needed."""
     made, output, of = driven(100 * blocks, lambda y, own: share * y + noise * own, bad=bad)
-    found = missed_response(made, output, "ft", of, BlockSettings())
+    found = missed_response(made, output, "ft", of)
     assert found == pytest.approx(missed, abs=0.2 if noise and missed else 1e-6)
 
 

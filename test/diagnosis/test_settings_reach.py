@@ -1,20 +1,18 @@
-"""Numbers that were constants of other modules are settings: a changed one reaches what it steers."""
+"""Numbers beside the code of intervals and of the flexible law steer what they say."""
 
 from __future__ import annotations
-
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from rsea_ros.checks.faults import check
 from rsea_ros.diagnosis.diagnose import nominal_problem
+from rsea_ros.diagnosis.naming import flexible as law
 from rsea_ros.diagnosis.naming.flexible import flexible, rows_of
 from rsea_ros.diagnosis.settings import DEFAULT
 from rsea_ros.effects.catalogue import effect_named
-from rsea_ros.identification.confidence import confidence_of
+from rsea_ros.identification import confidence
 from rsea_ros.identification.fit import add_effect
-from rsea_ros.identification.settings import IntervalSettings
 from rsea_ros.identification.solver import solve
 from rsea_ros.identification.unknowns import start_vector
 from rsea_ros.model.rig_file import load_rig
@@ -22,10 +20,6 @@ from rsea_ros.model.simulation import synthesize
 from rsea_ros.records.record import Channel
 
 RIG = load_rig("paper_high_impedance")
-
-
-def steer(group, **values):
-    return replace(DEFAULT, **{group: replace(getattr(DEFAULT, group), **values)})
 
 
 @pytest.fixture(scope="module")
@@ -41,27 +35,28 @@ def with_friction(checked):
     return add_effect(problem, start_vector(problem.unknowns), effect, effect.typical)
 
 
-def test_the_correction_of_an_interval_for_few_blocks(checked):
+def test_the_correction_of_an_interval_for_few_blocks(checked, monkeypatch):
     problem = nominal_problem([checked], RIG)
     solution = solve(problem, iterations=2)
-    few, many = (
-        np.diag(confidence_of(solution, rule=IntervalSettings(most_corrected=most)).covariance)
-        for most in (1.0, 100.0)
-    )
+    variances = []
+    for most in (1.0, 100.0):
+        monkeypatch.setattr(confidence, "_MOST_CORRECTED", most)
+        variances.append(np.diag(confidence.confidence_of(solution).covariance))
+    few, many = variances
     assert np.all(many >= few) and np.any(many > 2.0 * few)
 
 
-def test_the_knots_of_the_flexible_law(with_friction):
+def test_the_knots_of_the_flexible_law(with_friction, monkeypatch):
     rows = rows_of(*with_friction, "coulomb_friction", DEFAULT)
-    coarse = steer("evidence", knots=(0.0, 1.0))
-    gains = [flexible(*with_friction, "coulomb_friction", rows, s).gain for s in (DEFAULT, coarse)]
-    assert gains[0] != gains[1]
+    fine = flexible(*with_friction, "coulomb_friction", rows, DEFAULT).gain
+    monkeypatch.setattr(law, "_KNOTS", (0.0, 1.0))
+    assert flexible(*with_friction, "coulomb_friction", rows, DEFAULT).gain != fine
 
 
-def test_the_lags_of_the_flexible_law(checked):
+def test_the_lags_of_the_flexible_law(checked, monkeypatch):
     problem, delay = nominal_problem([checked], RIG), effect_named("command_delay")
     late = add_effect(problem, start_vector(problem.unknowns), delay, delay.typical)
     rows = rows_of(*late, "command_delay", DEFAULT)
-    short = steer("evidence", lags=(1,))
-    gains = [flexible(*late, "command_delay", rows, s).gain for s in (DEFAULT, short)]
-    assert gains[0] > gains[1]
+    far = flexible(*late, "command_delay", rows, DEFAULT).gain
+    monkeypatch.setattr(law, "_LAGS", (1,))
+    assert far > flexible(*late, "command_delay", rows, DEFAULT).gain

@@ -13,7 +13,6 @@ from similar_machine import factor, record_with, similar
 
 from rsea_ros.diagnosis.diagnose import searched_effects
 from rsea_ros.diagnosis.initial_guess import RecordView, initial_guesses
-from rsea_ros.diagnosis.settings import DEFAULT
 from rsea_ros.diagnosis.step_fits import screen
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.identification.fit import unknowns_of
@@ -36,7 +35,7 @@ def screen_effect(name: str, times: float):
     (effect,) = (e for e in searched_effects(current.problem, ()) if e.name == name)
     fitted, _ = apply(current.problem.rig, current.problem.unknowns, current.theta)
     view = RecordView(case, fitted, current.problem.outputs(current.theta)[0])
-    return screen(current, effect, initial_guesses(effect, view), DEFAULT.forward)
+    return screen(current, effect, initial_guesses(effect, view))
 
 
 @pytest.mark.parametrize("times", [4.0**-5])

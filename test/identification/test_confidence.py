@@ -10,6 +10,7 @@ import pytest
 
 from rsea_ros.identification import confidence
 from rsea_ros.identification.confidence import (
+    BLOCK,
     Confidence,
     _without_the_rest,
     confidence_of,
@@ -26,7 +27,6 @@ from rsea_ros.identification.confidence import (
     undetermined_remarks,
 )
 from rsea_ros.identification.result import ParameterEstimate
-from rsea_ros.identification.settings import INTERVALS
 from rsea_ros.identification.solver import Solution
 from rsea_ros.identification.unknowns import Unknown
 from rsea_ros.model.drive import Drive
@@ -68,8 +68,8 @@ def test_the_covariance_is_whites_sandwich_over_blocks_of_a_second_beside_the_pr
     found = confidence_of(solved())
     inverse = np.linalg.inv(J.T @ J + np.diag(1.0 / DOUBTS**2))
     scores = np.array([J[100 * k : 100 * k + 100].T @ R[100 * k : 100 * k + 100] for k in range(6)])
-    assert INTERVALS.block == 1.0
-    middle = scores.T @ scores * 6.0 / max(6 - 3, 6 / INTERVALS.most_corrected) + np.diag(1.0 / DOUBTS**2)
+    assert BLOCK == 1.0
+    middle = scores.T @ scores * 6.0 / max(6 - 3, 6 / 4.0) + np.diag(1.0 / DOUBTS**2)
     expected = inverse @ middle @ inverse
     larger = np.sqrt(np.maximum(1.0, np.diag(inverse) / np.diag(expected)))
     assert found.covariance == pytest.approx(expected * np.outer(larger, larger), rel=1e-6)

@@ -55,7 +55,7 @@ def cause_of(
     where its residual falls.
     """
     (without, with_it), effect = step, effect_named(step[1].added)
-    channel = _helped_channel(without.test, with_it.test, channel, settings.sizes)
+    channel = _helped_channel(without.test, with_it.test, channel)
     held_out, interval = gain(with_it.test, without.test, channel, settings.acceptance.resamples)
     train, _ = gain(with_it.train, without.train, channel)
     return Cause(
@@ -68,9 +68,14 @@ def cause_of(
     )
 
 
-def _helped_channel(without: Score, with_it: Score, channel: str, rule: SizeSettings) -> str:
+_FALL = 1.02
+"""Ratio by which a channel's residual must fall for the gain to speak of it: less is what acceptance.matters
+calls nothing."""
+
+
+def _helped_channel(without: Score, with_it: Score, channel: str) -> str:
     """Return a channel if its residual falls, else the one whose residual falls most."""
-    if without.ratio(channel) > rule.fall * with_it.ratio(channel):
+    if without.ratio(channel) > _FALL * with_it.ratio(channel):
         return channel
     return max(without.sums, key=lambda n: without.ratio(n) / max(with_it.ratio(n), 1e-12))
 
@@ -81,7 +86,7 @@ def alternative_of(
     """Return a rival of a cause with its size where it acts in that cause's place."""
     claim, evidence = weighed.claim, weighed.evidence
     solution = solve(claim.problem, claim.theta, iterations=0)
-    confidence = confidence_of(solution, rule=settings.intervals)
+    confidence = confidence_of(solution)
     resamples = settings.acceptance.resamples
     held_out, interval = gain(claim.with_it, claim.without, evidence.channel, resamples)
     return Alternative(
@@ -403,9 +408,9 @@ def _next_experiment(
             claims = [named.cause.claim, *(rival.claim for rival, _ in named.rivals)]
             problems = [replace(c.problem, newest=c.name) for c in claims]
             ends = [solve(p, c.theta, iterations=0) for p, c in zip(problems, claims, strict=True)]
-            return separating_run(ends[0], ends[1:], rate, settings.next_run)
+            return separating_run(ends[0], ends[1:], rate)
     if outcome.verdict in ("unexplained", "partly_explained") and not is_at_floor(last.test, settings.floor):
-        return amplitude_series(last.solution, last.test.ratio(last.test.worst), rate, settings.next_run)
+        return amplitude_series(last.solution, last.test.ratio(last.test.worst), rate)
     return None
 
 

@@ -27,7 +27,7 @@ from rsea_ros.diagnosis.naming.flexible import (
     weight_by,
 )
 from rsea_ros.diagnosis.score import Score, gain, score_on
-from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings, EvidenceSettings
+from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Map
@@ -52,7 +52,12 @@ class Signature:
     lasting: float = 0.0
 
 
-def signature(rows: ContributionRows, rule: EvidenceSettings = DEFAULT.evidence) -> Signature:
+_PARTS, _BANDS = 4, 6
+"""Parts of amplitude and of time, and frequency bands, for the shape of a law: fixed when the coefficients of
+status.py were fitted (after a change, `python -m bench calibration fit`)."""
+
+
+def signature(rows: ContributionRows) -> Signature:
     """Return the signature of a cause."""
     c, r = (project_out(rows, v) for v in (rows.contribution, rows.residual))
     cc, cr = c * c, c * r
@@ -60,9 +65,9 @@ def signature(rows: ContributionRows, rule: EvidenceSettings = DEFAULT.evidence)
     carried, lasting = _lasting(*every)
     return Signature(
         overall=_spread(*every),
-        amplitude=_spread(*_sums(_parts_by(np.abs(c), cc, rule.parts), cc, cr)),
-        time=_spread(*_sums(_parts_by(rows.block.astype(float), cc, rule.parts), cc, cr)),
-        frequency=_over_frequency(rows, c, r, rule.bands),
+        amplitude=_spread(*_sums(_parts_by(np.abs(c), cc, _PARTS), cc, cr)),
+        time=_spread(*_sums(_parts_by(rows.block.astype(float), cc, _PARTS), cc, cr)),
+        frequency=_over_frequency(rows, c, r, _BANDS),
         carried=carried,
         lasting=lasting,
     )
@@ -185,7 +190,7 @@ def evidence_for(
     )
     gained, (low, _) = gain(claim.with_it, claim.without, channel, settings.acceptance.resamples)
     return Evidence(
-        name=claim.name, signature=signature(rows, settings.evidence),
+        name=claim.name, signature=signature(rows),
         flexible=flexible(problem, claim.theta, claim.name, rows, settings), channel=channel, gain=gained,
         gain_low=low,
         is_sure=preference(claim.with_it, claim.without, parameters, settings.acceptance).sure,

@@ -17,7 +17,7 @@ import numpy as np
 from rsea_ros.diagnosis.candidate import in_units_of, without_effect
 from rsea_ros.diagnosis.data_split import TEST, blocks_of, set_of
 from rsea_ros.diagnosis.score import Score, gain_of
-from rsea_ros.diagnosis.settings import BlockSettings, DiagnosisSettings, EvidenceSettings
+from rsea_ros.diagnosis.settings import BlockSettings, DiagnosisSettings
 from rsea_ros.effects import signal_table as st
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.effects.effect import Effect
@@ -49,6 +49,11 @@ def weight_by(problem: Problem, cases: Sequence[Case], weights: Score) -> Proble
     return replace(problem, cases=in_units_of(weights, cases))
 
 
+_LEAST_CONTRIBUTION = 1e-5
+"""Power of a contribution over that of the residual below which a cause changes nothing: it lowers the
+residual's power by no more than its contribution's, and the least gain that is named is 100 times as much."""
+
+
 def rows_of(
     problem: Problem, theta: FloatArray, name: str, settings: DiagnosisSettings, run: Map = serial
 ) -> ContributionRows | None:
@@ -63,7 +68,7 @@ def rows_of(
     if not np.isfinite(power(error)) or not np.isfinite(power(without)):
         return None
     contribution = error - without
-    if power(contribution) < settings.evidence.least_contribution * power(error):
+    if power(contribution) < _LEAST_CONTRIBUTION * power(error):
         return None
     which = [i for i, u in enumerate(problem.unknowns) if not u.name.startswith(name + ".")]
     block, tests, runs = _blocks_of_rows(problem, settings.blocks)
@@ -99,6 +104,11 @@ def project_out(rows: ContributionRows, values: FloatArray) -> FloatArray:
     return np.asarray(values - a @ np.linalg.lstsq(normal, a.T @ values, rcond=None)[0])
 
 
+_KNOTS = (0.0, 0.1, 0.25, 0.5, 0.75, 0.9, 1.0)
+"""Quantiles of a regressor's size between which the law is straight, each sign for itself: finer at both
+ends, where friction and stops act. Fixed, as the lags, when the coefficients of status.py were fitted."""
+_LAGS = (1, 2, 4, 8)
+"""Samples by which the law looks back, for a cause that is a time: doubling, to 29 ms at 280 Hz."""
 _RIDGE = 1e-6
 """Of each column's power: keeps parts of the spline apart that the data do not. Numerical: a thousandth of a
 column's size."""
@@ -119,7 +129,7 @@ def flexible(
     problem: Problem, theta: FloatArray, name: str, rows: ContributionRows, settings: DiagnosisSettings
 ) -> Flexible | None:
     """Return the gain of a spline beside a cause; None for a cause without a suitable regressor."""
-    responses = _responses(problem, theta, effect_named(name), settings.evidence)
+    responses = _responses(problem, theta, effect_named(name))
     if not responses:
         return None
     matrix = np.column_stack([*responses, rows.others])
@@ -140,16 +150,14 @@ def _by_block(rows: ContributionRows, values: FloatArray) -> FloatArray:
     return np.asarray(power[np.bincount(rows.block, rows.tests) > 0], np.float64)
 
 
-def _responses(
-    problem: Problem, theta: FloatArray, effect: Effect, rule: EvidenceSettings
-) -> list[FloatArray]:
+def _responses(problem: Problem, theta: FloatArray, effect: Effect) -> list[FloatArray]:
     """Return the weighted responses of all rows to each part of the spline, shape (m,) each."""
     base = problem.outputs(theta)
     signals = [_signal(c, out, effect) for c, out in zip(problem.cases, base, strict=True)]
     if any(s is None for s in signals):
         return []
     parts = [
-        _spline(s, effect, _hold(c), _spans(c, s), rule)
+        _spline(s, effect, _hold(c), _spans(c, s))
         for s, c in zip(signals, problem.cases, strict=True)
         if s is not None
     ]
@@ -193,7 +201,7 @@ def _signal(case: Case, out: dict[str, FloatArray], effect: Effect) -> FloatArra
 
 
 def _spline(
-    signal: FloatArray, effect: Effect, hold: int, spans: Sequence[tuple[int, int]], rule: EvidenceSettings
+    signal: FloatArray, effect: Effect, hold: int, spans: Sequence[tuple[int, int]]
 ) -> list[Callable[[], FloatArray]]:
     """Return what makes each part of the spline along a signal: hats over its size, by sign, or its past.
 
@@ -201,9 +209,9 @@ def _spline(
     """
     if effect.main.unit in ("s", "Hz") and effect.port in (st.Port.COMMAND, st.Port.SENSOR):
         step = hold if effect.port is st.Port.COMMAND else 1
-        return [partial(_since, signal, k * step) for k in rule.lags]
+        return [partial(_since, signal, k * step) for k in _LAGS]
     size = np.abs(signal)
-    knots = np.unique(np.quantile(np.concatenate([size[a:b] for a, b in spans]), rule.knots))
+    knots = np.unique(np.quantile(np.concatenate([size[a:b] for a, b in spans]), _KNOTS))
     if len(knots) < 2:
         return []
     return [partial(_hat, signal, side, knots, k) for side in (1.0, -1.0) for k in range(len(knots))]

@@ -22,7 +22,7 @@ from types import MappingProxyType
 from rsea_ros.diagnosis.naming.evidence import Evidence
 from rsea_ros.diagnosis.naming.weighing import CauseAndRivals, Weighed
 from rsea_ros.diagnosis.result import Status
-from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings, EvidenceSettings, NamingSettings
+from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings, NamingSettings
 from rsea_ros.records.statistics import Z95
 
 COEFFICIENTS = MappingProxyType(
@@ -41,6 +41,9 @@ COEFFICIENTS = MappingProxyType(
 INTERCEPT = "intercept"
 _CERTAIN = 30.0
 """Log odds from which no number of this machine differs from certainty."""
+_LEAST_SPREAD, _MOST_SPREAD, _SUREST = 3e-3, 3.0, 4.0
+"""Spread of lambda that two right simulations of one law have, and above which it says no more; log odds
+among rivals above which they say no more, since all may be wrong. Fixed when the coefficients were fitted."""
 
 
 def features(e: Evidence, preferred: bool, settings: DiagnosisSettings = DEFAULT) -> dict[str, float]:
@@ -50,12 +53,12 @@ def features(e: Evidence, preferred: bool, settings: DiagnosisSettings = DEFAULT
     because the residual there is not noise, and more parameters always fit a little of it. noise: its model
     leaves only noise. flexible: sure gain of a spline beside it. edge: a parameter is at a bound.
     """
-    s, flexible, rule = e.signature, e.flexible, settings.evidence
+    s, flexible = e.signature, e.flexible
     bent = max(s.amplitude, s.time, s.frequency)
     return {
         INTERCEPT: 1.0,
-        "shape": 0.5 * (_relative(s.overall, rule) + _relative(bent, rule)),
-        "rivals": _log_odds(e.weight, rule.surest) / max(e.left, 1.0),
+        "shape": 0.5 * (_relative(s.overall) + _relative(bent)),
+        "rivals": _log_odds(e.weight) / max(e.left, 1.0),
         "preferred": float(preferred),
         "noise": float(e.left <= settings.floor.reached),
         "flexible": flexible.gain if flexible and flexible.ci95[0] > 0.0 else 0.0,
@@ -63,14 +66,14 @@ def features(e: Evidence, preferred: bool, settings: DiagnosisSettings = DEFAULT
     }
 
 
-def _relative(spread: float, rule: EvidenceSettings) -> float:
+def _relative(spread: float) -> float:
     """Return the logarithm of a spread of lambda over 0.1."""
-    return math.log((rule.least_spread + min(spread, rule.most_spread)) / 0.1)
+    return math.log((_LEAST_SPREAD + min(spread, _MOST_SPREAD)) / 0.1)
 
 
-def _log_odds(weight: float, surest: float) -> float:
+def _log_odds(weight: float) -> float:
     inside = min(max(weight, 1e-9), 1.0 - 1e-9)
-    return min(max(math.log(inside / (1.0 - inside)), -surest), surest)
+    return min(max(math.log(inside / (1.0 - inside)), -_SUREST), _SUREST)
 
 
 def probability(

@@ -19,6 +19,7 @@ from functools import partial
 import numpy as np
 
 from rsea_ros.diagnosis.candidate import (
+    LAST_GAIN,
     Candidate,
     FitSetup,
     effect_size,
@@ -38,6 +39,10 @@ from rsea_ros.identification.solver import Pools, Solution, power
 from rsea_ros.identification.unknowns import theta_with
 from rsea_ros.records.record import FloatArray
 from rsea_ros.records.statistics import Z95
+
+_CLOSE, _LEAST, _MOST = 1e-6, 0.02, 3
+"""Weights in a race from which an effect is fitted to the end (27 in twice the log likelihood, which the last
+steps of a long fit were seen to bring) and is a rival; rivals that are weighed."""
 
 
 def contests(
@@ -59,7 +64,7 @@ def weigh_rivals(selection: Selection, claim: Claim, held_out: HeldOut, pools: P
     itself is far from the rig, the rig is doubtful: its values decide between no two causes.
     """
     settings = selection.last.settings
-    rule, near = settings.evidence, settings.acceptance.near_bound
+    near = settings.acceptance.near_bound
     trust = 0.0 if is_off_rig(selection.last.solution) else 1.0
 
     def race(tried: Sequence[Trial]) -> tuple[list[Trial], list[Score], list[float]]:
@@ -73,15 +78,15 @@ def weigh_rivals(selection: Selection, claim: Claim, held_out: HeldOut, pools: P
     close = dict[str, Trial]()
     for tried in (_of_its_step(selection, claim), [mine, *selection.contenders.get(claim.name, ())]):
         runs, _, weights = race(tried)
-        close |= {t.name: t for t, w in zip(runs, weights, strict=True) if w >= rule.close_weight}
+        close |= {t.name: t for t, w in zip(runs, weights, strict=True) if w >= _CLOSE}
     close = {name: t for name, t in close.items() if name not in selection.last.causes}
     runs, scores, weights = race([mine, *_beside_all_causes(list(close.values()), claim, selection, pools)])
     claims = [
         Claim(t.name, t.problem, t.theta, score, held_out.score_of(t.beside), weight)
         for t, score, weight in zip(runs[1:], scores[1:], weights[1:], strict=True)
-        if weight >= rule.least_weight
+        if weight >= _LEAST
     ]
-    heaviest = sorted(claims, key=lambda c: -c.weight)[: rule.most_rivals]
+    heaviest = sorted(claims, key=lambda c: -c.weight)[: _MOST]
     return [replace(claim, weight=weights[0]), *heaviest]
 
 
@@ -136,8 +141,8 @@ def _in_place_of(claim: Claim, trial: Trial, selection: Selection, pools: Pools)
     for the other.
     """
     settings, last = selection.last.settings, selection.last
-    blocks, gain = (*TRAIN, *VALIDATION), settings.fits.final_gain
-    setup = FitSetup(selection.cases, settings, pools.run, last.validation, blocks=blocks, gain=gain)
+    blocks = (*TRAIN, *VALIDATION)
+    setup = FitSetup(selection.cases, settings, pools.run, last.validation, blocks=blocks, gain=LAST_GAIN)
     problem, theta = without_effect(claim.problem, claim.theta, claim.name)
     reached = list(zip(trial.problem.unknowns, trial.theta, strict=True))
     own = [(u, float(at)) for u, at in reached if u.name.startswith(trial.name + ".")]

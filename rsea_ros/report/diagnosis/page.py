@@ -6,10 +6,9 @@ from pathlib import Path
 from typing import Any
 
 from rsea_ros.diagnosis.result import Alternative, Cause, Diagnosis, Experiment, Rejected
-from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings
+from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings, Setting
 from rsea_ros.documents.wording import list_names
 from rsea_ros.identification.result import Overlay
-from rsea_ros.identification.settings import Setting
 from rsea_ros.identification.unknowns import CLOCK, CLOCK_REACH
 from rsea_ros.model.rig_file import rig_text
 from rsea_ros.outputs.files import Destination, NewFiles
@@ -287,7 +286,6 @@ def diagnosis_json(diagnosis: Diagnosis) -> dict[str, Any]:
         "next_experiment": following and {"why": say.next_run(following), **pick(following, "excitation")},
         "statements": list(remarks.remark_sentences(d.remarks)),
         "settings": {**pick(d.settings, "max_causes without"), **numbers},
-        "noise_numbers": {name: v for name, v in numbers.items() if name.startswith("noise.")},
     }  # fmt: skip
 
 
