@@ -6,7 +6,8 @@ Two channels of one machine are tied by a law y = P(s) x, late by a lag; the rig
     output held:  deflection = position     ft = (K + c s) position     torque = (K + b s + J s^2) position
                   torque = (1 + b/K s + J/K s^2) ft            torque = (K/s + b + J s) velocity
     without a spring:  torque = (G + b s + J s^2) position
-    otherwise:    torque - ft = (b s + J s^2) position       torque ~ ft, of which the lag counts
+    otherwise:    torque - ft = (b s + J s^2) position
+                  torque ~ ft in lag and sign, unless something else moves the output
 
 The coefficients are fitted to the measured response over its coherent lines, for each lag within 2 s, with no
 value of the rig. Where the windows agree, the pair has one part; elsewhere one for each span that does.
@@ -177,7 +178,8 @@ def _of_torque(torque: str, rig: Rig, m: Mechanics, held: bool) -> list[Law]:
         stated = (rig["rotor.reflected_damping"], gear_inertia(rig))
         rotor = [Law(torque, "position", (1, 2), stated, _ROTOR, "ft")]
         grounded = "housing_end" in rig.clamped and rig.ft_end == "spring_end"
-        return [Law(torque, "ft", (0,), (0.0,), ("",)), *(rotor if grounded else [])]
+        driven = [] if rig.motion == "measured" else [Law(torque, "ft", (0,), (0.0,), ("",))]
+        return driven + (rotor if grounded else [])
     mass, damping, stiffness = (float(v[0, 0]) for v in (m.mass, m.damping, m.stiffness))
     inertia = "spring_end.inertia" if rig.rigid_spring else "rotor.reflected_inertia"
     names = ("spring.stiffness" if held else "spring_end.stiffness", "rotor.reflected_damping", inertia)
@@ -230,7 +232,9 @@ def _kept(asked: tuple[Law, ...], content: bytes) -> list[tuple[Pair, ...]]:
 def _parts(record: Record, law: Law) -> list[Pair]:
     y, x = record[law.y], record[law.x]
     if law.less:
-        y = Channel(y.t, y.y - np.interp(y.t, record[law.less].t, record[law.less].y))
+        less = record[law.less]
+        y = y.between(less.t[0], np.nextafter(less.t[-1], np.inf))
+        y = Channel(y.t, y.y - np.interp(y.t, less.t, less.y))
     start, stop = max(y.t[0], x.t[0]), min(y.t[-1], x.t[-1])
     if min(y.rate, x.rate) < min(_SLOWEST, 0.6 * max(y.rate, x.rate)):
         simple = law.powers[-1] < 2 and law.powers[0] >= 0 and y.rate < x.rate

@@ -411,16 +411,12 @@ def _contradiction(p: Pair) -> Finding:
     says = f"{'times' if p.sign else 'not'} {law}"
     side = "behind" if p.lag > 0.0 else "ahead of"
     late = f", {1e3 * abs(p.lag):.3g} ms {side} it" if abs(p.lag) > _IN_TIME else ""
+    value, unit = (math.copysign(p.factor, p.sign), "1") if p.sign else (p.lag, "s")
     return Finding(
-        "amber",
-        "contradiction",
-        p.law.y,
-        math.copysign(p.factor, p.sign) if p.sign else p.lag,
-        "1" if p.sign else "s",
-        expected="1, in step",
+        "amber", "contradiction", p.law.y, value, unit, expected="1, in step",
         detail=f"{says}{late}, coherence {p.coherence:.2f}, from {p.start:.4g} s to {p.stop:.4g} s",
         remedy=f"nothing says which of {p.law.y} and {p.law.x} is wrong: look at unit and source of both",
-    )
+    )  # fmt: skip
 
 
 def _is_off(p: Pair) -> bool:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from rsea_ros.checks.pairs import is_held, laws, pairs_of
+from rsea_ros.checks.verdicts import verdict_findings
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.records.record import Channel, Record
 
@@ -124,3 +127,21 @@ def test_a_slow_channel_is_compared_with_the_faster_one_at_its_samples(y, x, fac
     assert (pair.start, pair.stop) == (0.0, 11.875) and pair.fits and pair.clear
     assert pair.lag == pytest.approx(0.2, abs=1.0 / RATE) and pair.coherence + pair.left == pytest.approx(1.0)
     assert (pair.sign * pair.factor, *pair.ratios) == pytest.approx((factor, factor), rel=0.01)
+
+
+@pytest.mark.parametrize("lost", ["", "ft", "motor_torque"])
+def test_an_output_that_something_else_moves_makes_an_ft_of_either_sign(lost) -> None:
+    """The motor gives way: its torque is -0.75 of ft at every instant, and nothing is turned."""
+    f = np.array([0.4, 0.9, 1.7, 2.9, 5.1])
+    phase = 2.0 * np.pi * np.outer(STAMPS, f) + np.array([0.2, 1.4, 2.9, 4.0, 5.5])
+    size = np.array([0.3, 0.12, 0.06, 0.02, 0.01])
+    q, w = np.sin(phase) @ size, np.cos(phase) @ (2.0 * np.pi * f * size)
+    a = -np.sin(phase) @ ((2.0 * np.pi * f) ** 2 * size)
+    ft = -(J * a + B * w + 8.0 * np.sign(w)) / 1.75
+    noise = np.random.default_rng(5).standard_normal((4, len(STAMPS)))
+    made = {"position": q + 1e-5 * noise[0], "deflection": ft / K + 1e-6 * noise[1], "command": -0.75 * ft,
+            "ft": ft + 0.02 * noise[2], "motor_torque": -0.75 * ft + 0.02 * noise[3]}  # fmt: skip
+    ends = {lost: 0.5 * DURATION}
+    record = Record({n: Channel(STAMPS, y).between(0.0, ends.get(n, DURATION)) for n, y in made.items()})
+    rig = replace(RIG, motion="measured")
+    assert verdict_findings(pairs_of(record, rig), rig, "z") == ([], {})
