@@ -24,7 +24,7 @@ from rsea_ros.model.simulation import Plant, drive_of, simulate, synthesize
 from rsea_ros.records.record import Channel, Record
 
 RIG = rsea.load_rig("paper_high_impedance")
-RATE, FINE = 280.0, 200
+RATE, FINE = 280.0, 60
 COMMAND = Channel(np.arange(400) / RATE, np.append(0.0, 10.0 * np.random.default_rng(0).standard_normal(399)))
 NUMBERS = {
     "one_pole": (0.036,), "two_poles": (12.0, 0.4), "average": (5.0,), "exponential": (0.2,),
