@@ -14,7 +14,7 @@ MODULES = sorted(path for top in ("rsea_ros", "msg_adapters") for path in (ROOT 
 
 @cache
 def tree_of(path: Path) -> ast.Module:
-    """Return the syntax tree of a module, read once; the collector of garbage would look through all, often."""
+    """Return the syntax tree of a module, read once, without the garbage collector looking through all."""
     gc.disable()
     tree = ast.parse(path.read_text(encoding="utf-8"))
     gc.freeze()
