@@ -168,4 +168,5 @@ def pytest_collection_finish() -> None:
     Else the collector of garbage looks through all modules and items again and again, 4 % of the time.
     """
     gc.freeze()
+    gc.set_threshold(10_000, 20, 20)
     gc.enable()

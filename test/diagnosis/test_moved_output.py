@@ -24,44 +24,44 @@ from rsea_ros.records.record import Channel, Record
 
 TRUE = {"rotor.reflected_inertia": 0.21, "rotor.reflected_damping": 1.9, "spring.stiffness": 310.0,
         "spring.damping": 0.55}  # fmt: skip
-RATE, SECONDS, PARTS = 250.0, 20.0, 8
+RATE, SECONDS, PARTS = 250.0, 20.0, 4
 WALK = np.array([[0.4, 0.35, 0.3], [0.9, 0.15, 2.0], [1.7, 0.08, 4.4], [2.9, 0.03, 1.1], [6.1, 0.006, 5.0]])
 PUSH = np.array([[0.3, 6.0, 0.2], [1.1, 4.0, 1.4], [2.3, 3.0, 2.9], [5.0, 2.0, 4.0], [9.0, 1.5, 5.5]])
 TRIED = ("nonlinear_spring", "coulomb_friction", "ft_gain_error", "torque_constant_error", "command_delay")
 SETTINGS = DiagnosisSettings(max_causes=1, without=tuple(n for n in catalogue() if n not in TRIED))
 
 
-def waves(table: np.ndarray, t: float) -> tuple[float, float]:
+def waves(table: np.ndarray, t: np.ndarray) -> tuple[list[float], list[float]]:
     """Return a sum of sines and its rate."""
     f, size, phase = table.T
-    angle = 2.0 * math.pi * f * t + phase
-    return float(size @ np.sin(angle)), float((2.0 * math.pi * f * size) @ np.cos(angle))
+    angle = 2.0 * math.pi * f * t[:, None] + phase
+    return (np.sin(angle) @ size).tolist(), (np.cos(angle) @ (2.0 * math.pi * f * size)).tolist()
 
 
 @cache
 def moved(cubic: float = 0.0) -> Record:
     """Return the record of a joint whose output walks, with a spring K (d + cubic d^3)."""
     j, b, k, c = TRUE.values()
+    h, steps = 1.0 / (RATE * PARTS), int(RATE * SECONDS) * PARTS
+    x, v = waves(WALK, np.arange(2 * steps + 1) * h / 2)
+    pushed = waves(PUSH, np.arange(steps // PARTS) / RATE)[0]
 
-    def rates(q: float, w: float, t: float) -> tuple[float, float, float, float]:
-        x, v = waves(WALK, t)
-        d = q - x
-        torque = k * (d + cubic * d**3) + c * (w - v)
+    def rates(q: float, w: float, n: int) -> tuple[float, float, float, float]:
+        d = q - x[n]
+        torque = k * (d + cubic * d**3) + c * (w - v[n])
         return w, (u - b * w - torque) / j, torque, d
 
-    h, q, w, rows, u = 1.0 / (RATE * PARTS), waves(WALK, 0.0)[0], 0.0, [], 0.0
-    for n in range(int(RATE * SECONDS)):
-        t = n / RATE
-        ft, d = rates(q, w, t)[2:]
-        acted, u = u, waves(PUSH, t)[0]
-        rows.append((t, u, acted, q, ft, d))
-        for m in range(PARTS):
-            at = t + m * h
-            v1, a1, *_ = rates(q, w, at)
-            v2, a2, *_ = rates(q + h / 2 * v1, w + h / 2 * a1, at + h / 2)
-            v3, a3, *_ = rates(q + h / 2 * v2, w + h / 2 * a2, at + h / 2)
-            v4, a4, *_ = rates(q + h * v3, w + h * a3, at + h)
-            q, w = q + h / 6 * (v1 + 2 * v2 + 2 * v3 + v4), w + h / 6 * (a1 + 2 * a2 + 2 * a3 + a4)
+    q, w, rows, u = x[0], 0.0, [], 0.0
+    for n in range(0, 2 * steps, 2):
+        if n % (2 * PARTS) == 0:
+            ft, d = rates(q, w, n)[2:]
+            acted, u = u, pushed[n // (2 * PARTS)]
+            rows.append((n * h / 2, u, acted, q, ft, d))
+        v1, a1, *_ = rates(q, w, n)
+        v2, a2, *_ = rates(q + h / 2 * v1, w + h / 2 * a1, n + 1)
+        v3, a3, *_ = rates(q + h / 2 * v2, w + h / 2 * a2, n + 1)
+        v4, a4, *_ = rates(q + h * v3, w + h * a3, n + 2)
+        q, w = q + h / 6 * (v1 + 2 * v2 + 2 * v3 + v4), w + h / 6 * (a1 + 2 * a2 + 2 * a3 + a4)
     t, command, *shown = np.array(rows).T
     rng = np.random.default_rng(5)
     noise = {"motor_torque": 0.05, "position": 1e-5, "ft": 0.03, "deflection": 2e-5}
@@ -104,11 +104,7 @@ def test_a_hardening_spring_is_named_with_its_size():
         "ft": True, "motor_torque": True}  # fmt: skip
 
 
-def test_a_sound_joint_has_no_cause():
-    assert diagnose([moved()], joint(), settings=SETTINGS).verdict == "nothing_wrong"
-
-
-def test_a_torque_that_no_hold_of_the_log_made_counts_where_the_motion_says():
+def test_a_sound_joint_has_no_cause_also_where_no_hold_of_the_log_made_its_torque():
     """A loop that is far faster than its log holds nothing from row to row."""
     run = moved()
     torque = run["motor_torque"]

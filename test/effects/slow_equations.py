@@ -16,7 +16,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 J_M, J_SC, B_M, K_S, B_S, RATIO = 0.953, 0.0040, 23.088, 1530.456, 3.0, 502.0
-CREEP, CONTACT, DURATION = 2e-3, 1e7, 1.0
+CREEP, CONTACT, DURATION = 2e-3, 1e7, 0.5
 J = J_M + J_SC
 
 Law = Callable[[float, np.ndarray, float, Mapping[str, float]], Any]

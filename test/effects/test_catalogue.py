@@ -91,13 +91,14 @@ def test_the_step_is_short_enough(effect: Effect):
 
 @every_effect
 def test_the_simulation_is_finite_over_the_whole_bounds(effect: Effect):
-    driven, corners = drive(duration=0.5), [(p.low, p.typical, p.high) for p in effect.parameters]
+    driven, bounds = drive(duration=0.5), [(p.low, p.high) for p in effect.parameters]
+    corners = ([p.typical for p in effect.parameters], *itertools.product(*bounds))
     for bench in map(load_rig, RIGS):
         if effect.name == "base_compliance" and "spring_end" not in bench.clamped:
             with pytest.raises(ParameterError, match="spring_end is free, expected clamped"):
                 simulate(driven, effect.name, effect.typical, bench)
             continue
-        for corner in itertools.product(*corners):
+        for corner in corners:
             parameters = dict(zip(effect.typical, corner, strict=True))
             for values in simulate(driven, effect.name, parameters, bench).values():
                 assert np.abs(values).max() < 1e5, (bench.name, parameters)

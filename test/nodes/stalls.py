@@ -4,9 +4,10 @@ import time
 
 STALLS = (
     "no_reply", "heldup", "ft", "effort", "deflection", "velocity", "power",
-    "motor_state: bus_watchdog is -1",
+    "motor_state: bus_watchdog is -1", "refused",
 )  # fmt: skip
-"""Beginnings of the texts of such faults; no test that clears them provokes one."""
+"""Beginnings of the texts of such faults; no test that clears them provokes one. A motor whose watchdog has
+ended its torque refuses each goal: which of the two is told first is chance."""
 
 
 def is_stall(fault):

@@ -108,7 +108,7 @@ def diagnosed(tmp_path_factory: pytest.TempPathFactory) -> Diagnosed:
     )
     record = synthesize(bench, Channel(np.arange(len(command)) / RATE, command), seed=5)
     record = replace(record, epoch_ns=EPOCH, source="runs/bench & <friends>")
-    tried = ("coulomb_friction", "stribeck_friction", "lugre_friction", "backlash", "command_delay")
+    tried = ("coulomb_friction", "stribeck_friction", "backlash")
     settings = DiagnosisSettings(without=tuple(n for n in catalogue() if n not in tried))
     diagnosis = diagnose([record], load_rig("paper_high_impedance"), settings=settings)
     out = tmp_path_factory.mktemp("diagnosed") / "new" / "out"

@@ -24,8 +24,8 @@ ATTEMPTS, PATIENCE = 5, 0.02
 """Of a transaction outside the cycle: how often it is tried, and how late a reply may be each time, s."""
 ALERT = 0x80
 REFUSALS = {
-    1: "failed", 2: "unknown instruction", 3: "CRC wrong", 4: "value out of range", 5: "length wrong",
-    6: "value beyond its limit", 7: "access denied",
+    1: "failed", 2: "unknown instruction", 3: "CRC wrong", 5: "length wrong", 6: "value beyond its limit",
+    4: "value out of range, or its bus watchdog has ended the torque", 7: "access denied",
 }  # fmt: skip
 EMPTY = 11
 """Bytes of a status packet without parameters."""
