@@ -31,7 +31,7 @@ from rsea_ros.control.reference import Reference
 from rsea_ros.control.synthesis import design
 from rsea_ros.control.uncertainty import lightest, load_range, lock
 from rsea_ros.errors import check_kind, check_rate
-from rsea_ros.model.rig import MOTOR_TORQUE, Rig, motor_torque
+from rsea_ros.model.rig import Rig, motor_torque
 from rsea_ros.records.record import HUGE, NONSENSE, FloatArray, is_measured
 
 CORNER = 80.0
@@ -42,13 +42,13 @@ CORNER = 80.0
 class TorqueLimits:
     """torque: N m, of the motor. slew: N m/s. ramp: s in which the limit grows after the start."""
 
-    torque: float = MOTOR_TORQUE
+    torque: float
     slew: float = 40_000.0
     ramp: float = 0.25
 
     @classmethod
     def of(cls, rig: Rig) -> TorqueLimits:
-        """Return the limits of the motor that the rig states, else those of MOTOR_TORQUE."""
+        """Return the limits of the motor that the rig states, else those of the paper's (`motor_torque`)."""
         return cls(motor_torque(rig)[0])
 
 

@@ -39,7 +39,7 @@ from rsea_ros.control.uncertainty import (
 )
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.propagator import state_space
-from rsea_ros.model.rig import EffectSetting, Rig
+from rsea_ros.model.rig import EffectSetting, Rig, motor_torque
 
 HZ, AMPLITUDE = 5.0, 10.0
 
@@ -211,8 +211,8 @@ def disturbed_rig(loads: Mapping[str, Rig], case: BenchVariant) -> Rig:
 
 
 def amplitude_of(load: Rig) -> float:
-    """Return the sine, N m, that a load lets a motor of 68 N m make at 5 Hz, a fifth of it to spare."""
-    return min(AMPLITUDE, 0.8 * largest(load.with_effects(), HZ, TorqueLimits().torque, math.inf))
+    """Return the sine, N m, that a load lets its motor make at 5 Hz, a fifth of it to spare."""
+    return min(AMPLITUDE, 0.8 * largest(load.with_effects(), HZ, motor_torque(load)[0], math.inf))
 
 
 def tracking_error(rig: Rig, loads: Mapping[str, Rig], case: BenchVariant, design: ControllerDesign) -> float:

@@ -9,15 +9,15 @@
 
 F is the RMS torque error for each N m of Coulomb friction that nobody has foreseen while the actuator goes
 to and fro at f. P = T_d / T_m; S is the sensitivity, to a torque on the gear and to one on the command,
-whichever is larger; Z the output impedance, Z_s that of the bare spring; w / T_f the gear's speed for a torque
-on it, under control. Coulomb friction is a relay from w to T_f: it makes a limit cycle where that response is
-real and negative (describing function; Armstrong-Helouvry, Amin, IEEE Trans. Automatic Control 41, 1996),
-which an integral and a disturbance observer that both act below a few Hz bring about. The loop is the sampled
-one, with hold and one sample of delay, exact at every frequency. |S| <= M keeps a gain margin of M / (M - 1)
-and a phase margin of 2 asin(1 / 2 M): 6 dB, 29 deg for 2; 3.5 dB, 19 deg for 3, and that with the lag of the
-set. The set: uncertainty.py, its corners here, all of it in `rsea control`. The search is Nelder and Mead's in
-the logarithms of the gains; then the poles of the closed loop, taken from the code that runs, decide whether
-the design is let through.
+whichever is larger; Z the output impedance, Z_s that of the bare spring; w / T_f the gear's speed for a
+torque on it, under control. Coulomb friction is a relay from w to T_f: it makes a limit cycle where that
+response is real and negative (describing function; Armstrong-Helouvry, Amin, IEEE Trans. Automatic Control
+41, 1996), which an integral and a disturbance observer that both act below a few Hz bring about. The loop is
+the sampled one, with hold and one sample of delay, exact at every frequency. |S| <= M keeps a gain margin of
+M / (M - 1) and a phase margin of 2 asin(1 / 2 M): 6 dB, 29 deg for 2; 3.5 dB, 19 deg for 3, and that with the
+lag of the set. The set: uncertainty.py, its corners here, all of it in `rsea control`. The search is Nelder
+and Mead's in the logarithms of the gains; then the poles of the closed loop, taken from the code that runs,
+decide whether the design is let through.
 """
 
 from collections.abc import Callable, Mapping
@@ -38,7 +38,16 @@ from rsea_ros.control.margins import (
     margins,
     returns,
 )
-from rsea_ros.control.uncertainty import LOCKED, Family, Mode, Uncertainty, assumed, corners, family
+from rsea_ros.control.uncertainty import (
+    LOCKED,
+    UNMEASURED,
+    Family,
+    Mode,
+    Uncertainty,
+    assumed,
+    corners,
+    family,
+)
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.rig import Rig, motor_torque
 from rsea_ros.records.record import ComplexArray, FloatArray
@@ -98,7 +107,7 @@ class ControllerDesign:
     sensitivity: float = float("nan")
     impedance: float = float("nan")
     noise: float = float("nan")
-    uncertainty: Uncertainty = Uncertainty()
+    uncertainty: Uncertainty = UNMEASURED
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
     loads           locked, and the free ends with 0.5 to 100 times their inertia
     K_s, b_m, J_m   the 95 % intervals of a fit, no less than 2, 10 and 0 %; else 10, 50 and 0 %. A stiff
                     spring stands with a light rotor: there the natural frequency is furthest off
-    path            one sample more than the one of the design, or 1/80 of the natural period if that is longer
+    path            one sample more than that of the design, or 1/80 of the natural period if that is longer
     sensor          a mode of the F/T sensor's mount, where one is stated
 
 `load_uncertainty` reads the set of a bench from a file (docs/control.md), with the timing that was measured
@@ -127,11 +127,15 @@ class Uncertainty:
         return ", ".join(parts) or "nothing"
 
 
+UNMEASURED = Uncertainty()
+"""The set of an actuator of which nothing is stated."""
+
+
 def assumed(rig: Rig, rate: float) -> Uncertainty:
     """Return the set of a rig whose timing nobody has measured. rate: Hz."""
     period = 2.0 * np.pi * np.sqrt(rig["rotor.reflected_inertia"] / rig["spring.stiffness"])
-    wide = (_width(rig, name, usual) for name, usual in USUAL.items())
-    return Uncertainty(*wide, delay=max(0.0, float(period) / LAG - 1.0 / rate))
+    stiffness, damping, inertia = (_width(rig, name, usual) for name, usual in USUAL.items())
+    return Uncertainty(stiffness, damping, inertia, delay=max(0.0, float(period) / LAG - 1.0 / rate))
 
 
 USUAL = {"spring.stiffness": 0.1, "rotor.reflected_damping": 0.5, "rotor.reflected_inertia": 0.0}
@@ -156,7 +160,7 @@ MOST = {**dict.fromkeys(KEYS, 0.9), "late_samples": 5.0, "delay": 0.05, "frequen
 
 
 def load_uncertainty(path: str | Path, rig: Rig, rate: float) -> Uncertainty:
-    """Return the set that a YAML file states; what it leaves out is that of `assumed`. Format: docs/control.md.
+    """Return the set of a YAML file (docs/control.md); what it leaves out is that of `assumed`.
 
     Raises ParameterError with file, line, field, value and expected value.
     """
@@ -165,24 +169,18 @@ def load_uncertainty(path: str | Path, rig: Rig, rate: float) -> Uncertainty:
         body = strict_yaml.mapping(content, "file", f"a mapping with keys of {', '.join(KEYS)}, mode")
         strict_yaml.only_keys(body, {*KEYS, "mode"}, "file")
         stated = {name: _stated(body[name], name, KEYS[name]) for name in KEYS if name in body}
-        base = assumed(rig, rate)
-        if "late_samples" in stated:
-            stated["samples"] = stated.pop("late_samples")
-            if stated["samples"] % 1.0:
-                raise FieldError("late_samples: expected a whole number of samples", "late_samples")
-            base = replace(base, samples=int(stated.pop("samples")))
-        mode = body.get("mode")
-        if mode is not None:
-            parts = strict_yaml.mapping(mode, "mode", f"a mapping with the keys {', '.join(MODE)}")
+        late = stated.pop("late_samples", float(UNMEASURED.samples))
+        if late % 1.0:
+            raise FieldError(f"late_samples = {late:g}, expected a whole number of samples", "late_samples")
+        whole: dict[str, Any] = {**stated, "samples": int(late)}
+        if "mode" in body:
+            parts = strict_yaml.mapping(body["mode"], "mode", f"a mapping with the keys {', '.join(MODE)}")
             strict_yaml.only_keys(parts, set(MODE), "mode")
-            values = [_stated(parts.get(name), f"mode.{name}", unit) for name, unit in MODE.items()]
-            base = replace(base, mode=(values[0], values[1], values[2]))
-        return replace(base, **stated)
+            whole["mode"] = tuple(_stated(parts.get(name), f"mode.{name}", MODE[name]) for name in MODE)
+        return replace(assumed(rig, rate), **whole)
 
-    def refuse(message: str, field: str) -> ParameterError:
-        return ParameterError(message)
-
-    return strict_yaml.load(Path(path), "an uncertainty in YAML that can be read", refuse, build)
+    expected = "an uncertainty in YAML that can be read"
+    return strict_yaml.load(Path(path), expected, lambda message, _: ParameterError(message), build)
 
 
 def _stated(body: Any, name: str, unit: str) -> float:
@@ -259,9 +257,11 @@ def dense(loads: Sequence[str], u: Uncertainty, steps: int = 5) -> list[BenchVar
     side = np.linspace(-1.0, 1.0, steps)
     stiff = [(1.0 + part * u.stiffness, 1.0 - part * u.inertia) for part in side.tolist()]
     wires = product({0: 0, u.samples: 0}, dict.fromkeys((0.0, 0.5 * u.delay, u.delay)))
-    modes = [None] + [(*u.mode[:2], part * u.mode[2]) for part in (0.5, 1.0)] if u.mode else [None]
+    modes: list[Mode | None] = [None]
+    if u.mode:
+        modes += [(u.mode[0], u.mode[1], part * u.mode[2]) for part in (0.5, 1.0)]
     every = product(loads, stiff, (1.0 + u.damping * side).tolist(), wires, modes)
-    return [BenchVariant(load, k, b, *wire, mode, j) for load, (k, j), b, wire, mode in every]
+    return [BenchVariant(load, k, b, n, delay, mode, j) for load, (k, j), b, (n, delay), mode in every]
 
 
 def variant_rig(load: Rig, case: BenchVariant) -> Rig:
