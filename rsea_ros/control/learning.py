@@ -119,7 +119,7 @@ QUICK = 0.01
 """s, in which a load is seen to be another one: a foot that lands."""
 FOLLOWS = 0.1
 """rad/s that the load should turn by for that."""
-UNUSUAL = 9.0
+UNUSUAL = 16.0
 """Times the mean square that the fit leaves."""
 LIGHTEST = 25.0
 """1/(kg m^2): no load is taken for lighter than 1/25 kg m^2."""

@@ -327,8 +327,11 @@ def study(
     rates: Sequence[float],
     motors: Sequence[MotorLimits] = (),
     progress: Callable[[str, float], None] = lambda step, share: None,
+    sets: Sequence[Uncertainty | None] = (),
 ) -> Study:
     """Return the study of a rig's actuator. free: a rig whose ends are the lightest load.
+
+    sets: what the controller must tolerate, at each rate; None: what `assumed` says.
 
     Raises ParameterError where the synthesis finds no gains, or where `free` is clamped at both ends.
     """
@@ -340,7 +343,7 @@ def study(
     done = []
     for k, rate in enumerate(rates):
         progress(f"{rate:g} Hz", k / len(rates))
-        designed = design(rig, loads, rate)
+        designed = design(rig, loads, rate, u=sets[k] if sets else None)
         done.append(_at_rate(clamped, light, loads, designed))
     reaches = {motor: tuple(_reaches(clamped, light, a, motor) for a in AMPLITUDES) for motor in motors}
     return Study(clamped, light, resonance, tuple(done), reaches)
