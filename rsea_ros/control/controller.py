@@ -59,13 +59,14 @@ class ControllerSettings:
     compensate: effects of the rig to compensate; None: all that have a law for it. preview: the desired
     torque is known two samples ahead, so it is not predicted. corner: of the prediction, Hz. learn: learn
     load and drive; use False inside an outer loop whose desired torque follows the motion (virtual.py),
-    because learning would change its impedance.
+    because learning would change its impedance. velocity: measured; else it is that of the last positions.
     """
 
     compensate: tuple[str, ...] | None = None
     preview: bool = False
     corner: float = CORNER
     learn: bool = True
+    velocity: bool = True
 
 
 FOLLOWED = 0.25
@@ -144,6 +145,7 @@ class TorqueController:
         self._prediction, self._acted = Prediction(settings.corner, 1.0 / rate), Acted(1.0 / rate)
         self._most = NONSENSE * max(limits.torque, 1.0)
         self._preview, self._learn, self._limits = settings.preview, settings.learn, limits
+        self._positions: list[float] | None = None if settings.velocity else []
         self._link = LinkMotion(self._law, link, FOLLOWED * limits.torque)
         self.start(Measurement(0.0, 0.0, 0.0))
 
@@ -151,6 +153,9 @@ class TorqueController:
         """Restart without a jump, from the present state of the bench and its motor torque."""
         desired = desired if is_measured(desired, self._most) else 0.0
         torque = reading.motor_torque if is_measured(reading.motor_torque, self._most) else 0.0
+        if self._positions is not None:
+            self._positions = [reading.position] if is_measured(reading.position, HUGE) else []
+            reading = replace(reading, velocity=0.0)
         if not self._is_usable(reading):
             reading = Measurement(0.0, 0.0, 0.0)
         softly = reading.ft if self._limits.ramp > 0.0 else desired
@@ -188,6 +193,8 @@ class TorqueController:
         """
         if not is_measured(desired, self._most):
             desired = self._prediction.expected(missed + 1)
+        if self._positions is not None:
+            reading = replace(reading, velocity=self._derived(reading.position, missed + self._skipped))
         if not (self._is_usable(reading) and math.isfinite(trust + offset + desired_offset)):
             return self._bridge(missed)
         if self._skipped * self._law.period > STALE:
@@ -220,6 +227,16 @@ class TorqueController:
         )
         model.advance(forward, float(ahead[0]))
         return torque
+
+    def _derived(self, position: float, missed: int) -> float:
+        """Return an encoder's velocity, rad/s: where the last three positions are known, without a lag."""
+        known, h = self._positions or [], self._law.period
+        if not is_measured(position, HUGE):
+            return math.nan
+        self._positions = [position, *known[:1]] if not missed else [position]
+        if missed or len(known) < 2:
+            return (position - known[0]) / (h * (missed + 1)) if known else 0.0
+        return (3.0 * position - 4.0 * known[0] + known[1]) / (2.0 * h)
 
     def _is_usable(self, r: Measurement) -> bool:
         return is_measured(r.ft, self._most) and all(
