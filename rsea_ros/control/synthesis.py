@@ -75,8 +75,8 @@ _STRIDE = 0.5
 _SHORT = 0.02
 _AIM = 0.9995
 """Of the impedance allowed: the search may end that much beside its aim."""
-HEAVY = ("x 4", "x 30", "x 100")
-"""Loads between others, or nearly locked: they are left to the check of what was found."""
+HEAVY = ("x 30", "x 100")
+"""Loads that are nearly locked: they are left to the check of what was found."""
 
 
 @dataclass(frozen=True)
@@ -207,7 +207,7 @@ def grid(rate: float, points: int = 150, mode: Mode | None = None) -> FloatArray
     """Return frequencies up to half the rate, Hz, those of the movement and of a mode among them."""
     highest = 0.4995 * rate
     parts = [
-        np.geomspace(LOWEST, 0.15 * rate, 3 * points // 2), np.linspace(0.15 * rate, highest, points // 2),
+        np.geomspace(LOWEST, 0.15 * rate, 5 * points // 2), np.linspace(0.15 * rate, highest, points // 2),
         MOVEMENT * _odd(highest),
     ]  # fmt: skip
     if mode:
