@@ -26,12 +26,12 @@ import numpy as np
 from scipy.optimize import minimize
 
 from bench.results import Row
-from rsea_ros.control.controller import Measurement, TorqueController, TorqueLimits
+from rsea_ros.control.controller import Measurement, TorqueController
 from rsea_ros.control.law import Gains
 from rsea_ros.control.study import amplitude_of, disturbed_rig
 from rsea_ros.control.synthesis import design
 from rsea_ros.control.uncertainty import LOCKED, BenchVariant, load_range, variant_rig
-from rsea_ros.model.rig import Rig
+from rsea_ros.model.rig import Rig, motor_torque
 from rsea_ros.model.simulation import Plant
 from rsea_ros.records.record import FloatArray
 
@@ -134,7 +134,9 @@ METHODS: dict[str, tuple[Callable[[Rig, float, Values], Step], Values]] = {
 
 
 IN_TIME, LATE = BenchVariant(LOCKED), BenchVariant(LOCKED, 1.0, 1.0, 1, 2e-3)
-WITHIN = (BenchVariant("free x 0.5"), BenchVariant(LOCKED, 1.1, 0.5, 1, 2e-3, 0.3))
+MODE = (33.0, 0.02, 0.3)
+"""Hz, damping ratio, participation, of the paper's F/T sensor."""
+WITHIN = (BenchVariant("free x 0.5"), BenchVariant(LOCKED, 1.1, 0.5, 1, 2e-3, MODE))
 """The lightest bench of the page, and the hardest locked one."""
 UNSTABLE = 1.5
 """An error above this is no control."""
@@ -182,7 +184,7 @@ def tune(name: str, rig: Rig, loads: Mapping[str, Rig], rate: float) -> Values:
 
 def error_of(step: Step, true: Rig, rate: float, amplitude: float, late: int) -> float:
     """Return the error of a sine of 5 Hz from 3 s on, over its RMS; above 1 the controller is useless."""
-    plant, limit = Plant(true, rate), TorqueLimits().torque
+    plant, limit = Plant(true, rate), motor_torque(true)[0]
     sample, pending, errors = plant.step(0.0), [0.0] * (1 + late), []
     for k in range(round(4.0 * rate)):
         wanted = amplitude * min(1.0, 4.0 * k / rate) ** 2 * math.sin(2.0 * math.pi * 5.0 * k / rate)

@@ -4,7 +4,7 @@ Run: python -m bench control [SECTION …] [RIG] [--free RIG] [--rate 280 1000].
 Sections: trials (the whole set swept, and 5 Hz simulated on all of its corners; the requirements, nominal and
 worst: `rsea control`), free (a free load, unknown, by frequency and amplitude, without
 and with an encoder on the link), impedance (the outer loop), link (the benefit of that encoder), baselines
-(docs/baselines.md). Through real nodes: `driver controller`.
+and users (docs/baselines.md). Through real nodes: `driver controller`.
 """
 
 from __future__ import annotations
@@ -17,19 +17,17 @@ import numpy as np
 
 from bench.control.baselines import baselines
 from bench.control.human import Virtual, measure_impedance, passive_to, stiffest
+from bench.control.users import users
 from bench.results import Row
-from rsea_ros.control.controller import TorqueLimits
 from rsea_ros.control.link import LinkShare, link_share, linked_set
 from rsea_ros.control.margins import distal_responses
 from rsea_ros.control.robustness import largest, robustness
 from rsea_ros.control.study import LEARNED, sine, tracking_error
 from rsea_ros.control.synthesis import ControllerDesign, design
-from rsea_ros.control.uncertainty import LOCKED, BenchVariant, Uncertainty, corners, load_range, lock
-from rsea_ros.model.rig import Rig
+from rsea_ros.control.uncertainty import LOCKED, BenchVariant, corners, load_range, lock
+from rsea_ros.model.rig import Rig, motor_torque
 from rsea_ros.model.rig_file import load_rig
 
-DAMPED = (33.0, 0.3, 1.0)
-"""Hz, damping ratio, participation: the other reading of a mode of 0.3."""
 SWEEP = np.array([0.5, 1.0, 2.0, 3.0, 5.0, 7.0, 10.0, 15.0, 20.0, 30.0, 45.0])
 
 
@@ -38,20 +36,20 @@ def trials(rig: Rig, free: Rig, rates: Sequence[float]) -> Iterator[str]:
     loads = load_range(rig, free)
     for designed in designs(rig, loads, rates):
         yield f"{designed.rate:g} Hz: {designed.gains}"
-        for u in (Uncertainty(), Uncertainty(mode=DAMPED)):
-            swept = robustness(loads[LOCKED], loads, designed, u=u)
-            m = swept.margins
-            yield (
-                f"{designed.rate:g} Hz, mode {u.mode}, {swept.cases} benches, {swept.unstable} unstable: "
-                f"least phase margin {m.phase:.1f} deg, gain {m.gain:.1f} dB, delay {m.delay:.2f} samples, "
-                f"|S| {swept.sensitivity:.2f} ({swept.where})"
-            )
+        swept = robustness(loads[LOCKED], loads, designed)
+        m = swept.margins
+        yield (
+            f"{designed.rate:g} Hz, {designed.uncertainty}, {swept.cases} benches, "
+            f"{swept.unstable} unstable: "
+            f"least phase margin {m.phase:.1f} deg, gain {m.gain:.1f} dB, delay {m.delay:.2f} samples, "
+            f"|S| {swept.sensitivity:.2f} ({swept.where})"
+        )
         yield from follow_sine(loads, designed)
 
 
 def follow_sine(loads: Mapping[str, Rig], designed: ControllerDesign) -> Iterator[str]:
     """Follow the sine on the rig with each load and on every corner of the set: the worst of each load."""
-    cases = corners(tuple(loads), Uncertainty())
+    cases = corners(tuple(loads), designed.uncertainty)
     for load in loads:
         mine = (case for case in cases if case.load == load)
         each = {case: tracking_error(loads[LOCKED], loads, case, designed) for case in mine}
@@ -68,7 +66,7 @@ def unknown(rig: Rig, free: Rig, rates: Sequence[float]) -> Iterator[str]:
     for designed in designs(rig, loads, rates):
         share = link_share(rig, loads, designed)
         for hz in (1.0, 2.0, 3.0, 4.0, 5.0, 7.0, 10.0):
-            most = min(10.0, 0.8 * largest(free, hz, TorqueLimits().torque, math.inf))
+            most = min(10.0, 0.8 * largest(free, hz, motor_torque(rig)[0], math.inf))
             errors = [
                 sine(free, lock(rig), designed, part * most, hz, span=LEARNED, link=link)
                 for link in (None, share)
@@ -121,7 +119,7 @@ def designs(rig: Rig, loads: Mapping[str, Rig], rates: Sequence[float]) -> list[
 
 SECTIONS: dict[str, Callable[[Rig, Rig, Sequence[float]], Iterator[Row | str]]] = {
     "trials": trials, "free": unknown, "impedance": outer, "link": with_link,
-    "baselines": baselines,
+    "baselines": baselines, "users": users,
 }  # fmt: skip
 
 

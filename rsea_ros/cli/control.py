@@ -33,6 +33,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("rig", nargs="?", default=RIG, help="rig or model.yaml (default %(default)s)")
     free = "rig whose ends are the lightest load (default: the rig; the paper's pendulum if it is clamped)"
     add("--free", metavar="RIG", help=free)
+    wide = "YAML of what to tolerate: spread, lag, mode (default: from the rig; docs/control.md)"
+    add("--uncertainty", metavar="FILE", help=wide)
     rates = "rates of the control loop, Hz (default 280 1000)"
     add("--rate", type=float, nargs="+", default=[280.0, 1000.0], metavar="HZ", help=rates)
     add_results(parser, f"{CONTROL_JSON} and {REPORT}", "out/control")
@@ -42,16 +44,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     from rsea_ros.control.study import study
-    from rsea_ros.control.uncertainty import lightest
+    from rsea_ros.control.uncertainty import lightest, load_uncertainty
     from rsea_ros.report import control as page
 
-    place = results_place(args, "out/control", (CONTROL_JSON, REPORT), [args.rig, args.free])
+    inputs = [args.rig, args.free, args.uncertainty]
+    place = results_place(args, "out/control", (CONTROL_JSON, REPORT), inputs)
     for rate in args.rate:
         if not SLOWEST <= rate <= FASTEST:
             raise ParameterError(f"--rate {rate:g} Hz, expected {SLOWEST:g} to {FASTEST:g} Hz")
     rig = load_rig(args.rig)
+    file = args.uncertainty
+    stated = [load_uncertainty(file, rig, rate) if file else None for rate in args.rate]
     with progress("control") as report_progress:
-        result = study(rig, lightest(rig, args.free or ""), args.rate, motors(rig), progress=report_progress)
+        light = lightest(rig, args.free or "")
+        result = study(rig, light, args.rate, motors(rig), progress=report_progress, sets=stated)
     source = provenance("control", [], args.rig)
     with NewFiles(place) as new:
         path = new.write(CONTROL_JSON, json_text(page.control_json(result)))

@@ -31,7 +31,7 @@ from rsea_ros.control.reference import Reference
 from rsea_ros.control.synthesis import design
 from rsea_ros.control.uncertainty import lightest, load_range, lock
 from rsea_ros.errors import check_kind, check_rate
-from rsea_ros.model.rig import MOTOR_TORQUE, Rig, motor_torque
+from rsea_ros.model.rig import Rig, motor_torque
 from rsea_ros.records.record import HUGE, NONSENSE, FloatArray, is_measured
 
 CORNER = 80.0
@@ -42,13 +42,13 @@ CORNER = 80.0
 class TorqueLimits:
     """torque: N m, of the motor. slew: N m/s. ramp: s in which the limit grows after the start."""
 
-    torque: float = MOTOR_TORQUE
+    torque: float
     slew: float = 40_000.0
     ramp: float = 0.25
 
     @classmethod
     def of(cls, rig: Rig) -> TorqueLimits:
-        """Return the limits of the motor that the rig states, else those of MOTOR_TORQUE."""
+        """Return the limits of the motor that the rig states, else those of the paper's (`motor_torque`)."""
         return cls(motor_torque(rig)[0])
 
 
@@ -59,13 +59,14 @@ class ControllerSettings:
     compensate: effects of the rig to compensate; None: all that have a law for it. preview: the desired
     torque is known two samples ahead, so it is not predicted. corner: of the prediction, Hz. learn: learn
     load and drive; use False inside an outer loop whose desired torque follows the motion (virtual.py),
-    because learning would change its impedance.
+    because learning would change its impedance. velocity: measured; else it is that of the last positions.
     """
 
     compensate: tuple[str, ...] | None = None
     preview: bool = False
     corner: float = CORNER
     learn: bool = True
+    velocity: bool = True
 
 
 FOLLOWED = 0.25
@@ -144,6 +145,7 @@ class TorqueController:
         self._prediction, self._acted = Prediction(settings.corner, 1.0 / rate), Acted(1.0 / rate)
         self._most = NONSENSE * max(limits.torque, 1.0)
         self._preview, self._learn, self._limits = settings.preview, settings.learn, limits
+        self._positions: list[float] | None = None if settings.velocity else []
         self._link = LinkMotion(self._law, link, FOLLOWED * limits.torque)
         self.start(Measurement(0.0, 0.0, 0.0))
 
@@ -151,6 +153,9 @@ class TorqueController:
         """Restart without a jump, from the present state of the bench and its motor torque."""
         desired = desired if is_measured(desired, self._most) else 0.0
         torque = reading.motor_torque if is_measured(reading.motor_torque, self._most) else 0.0
+        if self._positions is not None:
+            self._positions = [reading.position] if is_measured(reading.position, HUGE) else []
+            reading = replace(reading, velocity=0.0)
         if not self._is_usable(reading):
             reading = Measurement(0.0, 0.0, 0.0)
         softly = reading.ft if self._limits.ramp > 0.0 else desired
@@ -192,6 +197,8 @@ class TorqueController:
         """
         if not is_measured(desired, self._most):
             desired = self._prediction.expected(missed + 1)
+        if self._positions is not None:
+            reading = replace(reading, velocity=self._derived(reading.position, missed + self._skipped))
         if not (self._is_usable(reading) and math.isfinite(trust + offset + desired_offset)):
             return self._bridge(missed)
         if self._skipped * self._law.period > STALE:
@@ -224,6 +231,16 @@ class TorqueController:
         )
         model.advance(forward, float(ahead[0]))
         return torque
+
+    def _derived(self, position: float, missed: int) -> float:
+        """Return an encoder's velocity, rad/s: where the last three positions are known, without a lag."""
+        known, h = self._positions or [], self._law.period
+        if not is_measured(position, HUGE):
+            return math.nan
+        self._positions = [position, *known[:1]] if not missed else [position]
+        if missed or len(known) < 2:
+            return (position - known[0]) / (h * (missed + 1)) if known else 0.0
+        return (3.0 * position - 4.0 * known[0] + known[1]) / (2.0 * h)
 
     def _is_usable(self, r: Measurement) -> bool:
         return is_measured(r.ft, self._most) and all(

@@ -10,8 +10,6 @@ import math
 from collections import deque
 from dataclasses import dataclass
 
-from rsea_ros.control.uncertainty import Uncertainty
-
 SECOND = 1_000_000_000
 
 EARLY = 0.3
@@ -77,6 +75,10 @@ RETURN = 0.3
 """s in which feedback comes back from none to all."""
 
 
+SAMPLES, DELAY = 1, 2e-3
+"""Samples, and s, by which a command may be late with all of the feedback."""
+
+
 @dataclass(frozen=True)
 class Tolerance:
     """Lateness is a fault when a share of the commands within a time (s) was later than `late` samples."""
@@ -91,8 +93,7 @@ class Lateness:
 
     def __init__(self, rate: float, tolerance: Tolerance | None = None) -> None:
         """rate: Hz."""
-        u = Uncertainty()
-        self._full, self._gain = u.samples + u.delay * rate, 1.0 / (RETURN * rate)
+        self._full, self._gain = SAMPLES + DELAY * rate, 1.0 / (RETURN * rate)
         self.tolerance = tolerance or Tolerance()
         self._window = max(1, round(self.tolerance.time * rate))
         self.clear()

@@ -19,7 +19,7 @@ import numpy as np
 from rsea_ros.control.law import LINK, FeedbackLaw, law_of
 from rsea_ros.control.margins import distal_responses, encirclements, link_response, returns
 from rsea_ros.control.synthesis import SOFT, ControllerDesign, DesignLimits, grid
-from rsea_ros.control.uncertainty import Uncertainty, corners, family
+from rsea_ros.control.uncertainty import corners, family
 from rsea_ros.model.rig import Rig
 from rsea_ros.records.record import BoolArray, ComplexArray, FloatArray
 
@@ -111,8 +111,8 @@ class LinkedSet:
 
 def linked_set(rig: Rig, loads: Mapping[str, Rig], design: ControllerDesign) -> LinkedSet:
     """Return the corners of the set with every load."""
-    law, u, hz = law_of(rig, design.rate, design.gains), Uncertainty(), grid(design.rate, 60)
-    f = family(loads, corners(tuple(loads), u), u, design.rate, hz)
+    law, hz = law_of(rig, design.rate, design.gains), grid(design.rate, 60)
+    f = family(loads, corners(tuple(loads), design.uncertainty), design.rate, hz)
     memory, alone = returns(law, f.plant, hz, f.path, f.current)
     return LinkedSet(law, hz, f.nominal, f.path, f.plant[LINK], memory, alone)
 

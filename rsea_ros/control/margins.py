@@ -25,7 +25,7 @@ from rsea_ros.control.law import (
     sample_rig,
     z_of,
 )
-from rsea_ros.control.uncertainty import BenchVariant, Uncertainty, lags_of, lock, mode_of, variant_rig
+from rsea_ros.control.uncertainty import BenchVariant, lags_of, lock, mode_of, variant_rig
 from rsea_ros.model import outputs
 from rsea_ros.model.equations import COORDINATES, D
 from rsea_ros.model.outputs import Output
@@ -207,11 +207,11 @@ def distal_responses(rig: Rig, rate: float, hz: FloatArray) -> Moved:
     return Moved(hz, responses(sample_rig(lock(rig), rate), hz), torque, speed, spring)
 
 
-def moved_bench(rig: Rig, rate: float, hz: FloatArray, case: BenchVariant, u: Uncertainty) -> Moved:
+def moved_bench(rig: Rig, rate: float, hz: FloatArray, case: BenchVariant) -> Moved:
     """Return what moving the distal side of a bench of the set does. hz: below half the rate."""
     path, current = lags_of(case, rate, hz)
     still = distal_responses(variant_rig(rig, case), rate, hz)
-    return replace(still, sensor=mode_of(u.mode, case.participation, hz), path=path, current=current)
+    return replace(still, sensor=mode_of(case.mode, hz), path=path, current=current)
 
 
 def impedance(rig: Rig, rate: float, gains: Gains, hz: FloatArray) -> OutputImpedance:

@@ -50,11 +50,11 @@ def robustness(
     u: Uncertainty | None = None,
 ) -> Robustness:
     """Sweep the set, by default that of the design. steps: values of K_s and of b_m, each."""
-    u, hz, law = u or Uncertainty(), grid(designed.rate), law_of(rig, designed.rate, designed.gains)
+    u, hz, law = u or designed.uncertainty, grid(designed.rate), law_of(rig, designed.rate, designed.gains)
     total = unstable = 0
     worst, where, every = 0.0, BenchVariant(""), []
     for name in loads:
-        f = family(loads, dense((name,), u, steps), u, designed.rate, hz)
+        f = family(loads, dense((name,), u, steps), designed.rate, hz)
         memory, whole = returns(law, f.plant, hz, f.path, f.current)
         wound = encirclements(whole)
         total, unstable = total + len(f.cases), unstable + int(np.count_nonzero(wound > 0.5))
@@ -149,10 +149,9 @@ def spread(
     hz, law = grid(design.rate, CURVE_POINTS), law_of(rig, design.rate, design.gains)
     gains, phases = [], []
     for name in names:
-        u = Uncertainty()
-        f = family(loads, corners((name,), u), u, design.rate, hz)
+        f = family(loads, corners((name,), design.uncertainty), design.rate, hz)
         _, whole = returns(law, f.plant, hz, f.path, f.current)
-        sensor = np.array([mode_of(u.mode, case.participation, hz) for case in f.cases])
+        sensor = np.array([mode_of(case.mode, hz) for case in f.cases])
         transfer = f.plant[FT] / sensor * f.path / whole
         apart = transfer / transfer[f.nominal]
         gains.append(20.0 * np.log10(np.abs(apart)))
@@ -163,8 +162,8 @@ def spread(
 
 def softness(rig: Rig, design: ControllerDesign, hz: FloatArray) -> Softness:
     """Return the impedance of the set's locked benches. hz: below half the rate."""
-    u, law = Uncertainty(), law_of(rig, design.rate, design.gains)
-    benches = [moved_bench(rig, design.rate, hz, case, u) for case in corners((LOCKED,), u)]
+    law, cases = law_of(rig, design.rate, design.gains), corners((LOCKED,), design.uncertainty)
+    benches = [moved_bench(rig, design.rate, hz, case) for case in cases]
     impedances = np.abs([bench.impedance(law) for bench in benches])
     worst = max(float(bench.ratio(law).max()) for bench in benches)
     return Softness(hz, impedances.min(axis=0), impedances.max(axis=0), worst)

@@ -39,7 +39,7 @@ from rsea_ros.control.uncertainty import (
 )
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.propagator import state_space
-from rsea_ros.model.rig import EffectSetting, Rig
+from rsea_ros.model.rig import EffectSetting, Rig, motor_torque
 
 HZ, AMPLITUDE = 5.0, 10.0
 
@@ -137,7 +137,9 @@ def trials(
                       demand.impedance, worst=stiffest)  # fmt: skip
     yield from _sine_results(rig, loads, design)
     yield from _bandwidth(near, far, apart)
-    yield from _step_results(step_response(rig, rig, design), step_response(hard(loads), rig, design, late=1))
+    u = design.uncertainty
+    hardest = step_response(hard(loads, u), rig, design, late=u.samples)
+    yield from _step_results(step_response(rig, rig, design), hardest)
     rough = rig.with_effects(EFFECTS[0])
     yield TrialResult("3 N·m friction, not in the model", 100.0 * sine(rough, rig, design), "%", 6.0)
     yield TrialResult("3 N·m friction, in the model", 100.0 * sine(rough, rough, design), "%", 2.5)
@@ -148,7 +150,8 @@ def trials(
 
 def _sine_results(rig: Rig, loads: Mapping[str, Rig], design: ControllerDesign) -> Iterator[TrialResult]:
     near = list(loads)[1:4]
-    errors = {case: 100.0 * tracking_error(rig, loads, case, design) for case in hardest(loads)}
+    errors = {case: 100.0 * tracking_error(rig, loads, case, design) for name in loads
+        for case in lagging_corners(name, design.uncertainty)}
     yield TrialResult(
         "5 Hz, 10 N·m, locked", 100.0 * sine(rig, rig, design), "%", 2.0,
         worst=max(errors.values()), allowed=8.0,
@@ -158,7 +161,7 @@ def _sine_results(rig: Rig, loads: Mapping[str, Rig], design: ControllerDesign) 
             100.0 * tracking_error(rig, loads, BenchVariant(name), design),
             amplitude_of(loads[name]),
         )
-        worst = max(error, *(errors[case] for case in lagging_corners(name)))
+        worst = max(error, *(errors[case] for case in lagging_corners(name, design.uncertainty)))
         yield TrialResult(f"5 Hz, {amplitude:.1f} N·m, {name}, load unknown", error, "%", 5.0,
                           worst=worst, allowed=5.0)  # fmt: skip
 
@@ -181,42 +184,35 @@ def _step_results(near: Step, far: Step) -> Iterator[TrialResult]:
     yield TrialResult("within 5 % after", 1e3 * near.settling, "ms", worst=1e3 * far.settling)
 
 
-def hardest(loads: Mapping[str, Rig]) -> list[BenchVariant]:
-    """Return the simulated cases: every load, two corners of K_s and b_m, all of the lag, with the mode."""
-    return [case for name in loads for case in lagging_corners(name)]
-
-
-def lagging_corners(name: str) -> list[BenchVariant]:
+def lagging_corners(name: str, u: Uncertainty) -> list[BenchVariant]:
     """Return the corners of a load with all of the lag and the mode, K_s and b_m both high or both low."""
-    u = Uncertainty()
     return [
-        BenchVariant(name, 1.0 + k * u.stiffness, 1.0 + k * u.damping, u.samples, u.delay, u.mode[2])
+        BenchVariant(name, 1.0 + k * u.stiffness, 1.0 + k * u.damping, u.samples, u.delay, u.mode,
+                     1.0 - k * u.inertia)
         for k in (1, -1)
-    ]
+    ]  # fmt: skip
 
 
-def hard(loads: Mapping[str, Rig]) -> Rig:
-    """Return the locked bench that is stiffer, drags less, lags, and has the mode."""
-    u = Uncertainty()
-    stiff = BenchVariant(LOCKED, 1.0 + u.stiffness, 1.0 - u.damping, 0, u.delay, u.mode[2])
+def hard(loads: Mapping[str, Rig], u: Uncertainty) -> Rig:
+    """Return the locked bench that is stiffer, lighter, drags less, lags, and has the mode."""
+    stiff = BenchVariant(LOCKED, 1.0 + u.stiffness, 1.0 - u.damping, 0, u.delay, u.mode, 1.0 - u.inertia)
     return disturbed_rig(loads, stiff)
 
 
 def disturbed_rig(loads: Mapping[str, Rig], case: BenchVariant) -> Rig:
     """Return the bench of a case as a rig with effects; samples that are late are for `closed_loop`."""
-    u, effects = Uncertainty(), []
+    effects = []
     if case.delay:
         effects.append(EffectSetting("command_delay", {"delay": case.delay}))
-    if case.participation:
-        hz, ratio, _ = u.mode
-        shape = {"frequency": hz, "damping_ratio": ratio, "participation": case.participation}
+    if case.mode:
+        shape = dict(zip(("frequency", "damping_ratio", "participation"), case.mode, strict=True))
         effects.append(EffectSetting("structural_resonance", shape))
     return variant_rig(loads[case.load], case).with_effects(*effects)
 
 
 def amplitude_of(load: Rig) -> float:
-    """Return the sine, N m, that a load lets a motor of 68 N m make at 5 Hz, a fifth of it to spare."""
-    return min(AMPLITUDE, 0.8 * largest(load.with_effects(), HZ, TorqueLimits().torque, math.inf))
+    """Return the sine, N m, that a load lets its motor make at 5 Hz, a fifth of it to spare."""
+    return min(AMPLITUDE, 0.8 * largest(load.with_effects(), HZ, motor_torque(load)[0], math.inf))
 
 
 def tracking_error(rig: Rig, loads: Mapping[str, Rig], case: BenchVariant, design: ControllerDesign) -> float:
@@ -331,8 +327,11 @@ def study(
     rates: Sequence[float],
     motors: Sequence[MotorLimits] = (),
     progress: Callable[[str, float], None] = lambda step, share: None,
+    sets: Sequence[Uncertainty | None] = (),
 ) -> Study:
     """Return the study of a rig's actuator. free: a rig whose ends are the lightest load.
+
+    sets: what the controller must tolerate, at each rate; None: what `assumed` says.
 
     Raises ParameterError where the synthesis finds no gains, or where `free` is clamped at both ends.
     """
@@ -344,7 +343,7 @@ def study(
     done = []
     for k, rate in enumerate(rates):
         progress(f"{rate:g} Hz", k / len(rates))
-        designed = design(rig, loads, rate)
+        designed = design(rig, loads, rate, u=sets[k] if sets else None)
         done.append(_at_rate(clamped, light, loads, designed))
     reaches = {motor: tuple(_reaches(clamped, light, a, motor) for a in AMPLITUDES) for motor in motors}
     return Study(clamped, light, resonance, tuple(done), reaches)
@@ -360,7 +359,8 @@ def _at_rate(clamped: Rig, light: Rig, loads: Mapping[str, Rig], designed: Contr
     swept = robustness(clamped, loads, designed, steps=3)
     grid = np.geomspace(0.1, 0.45 * designed.rate, 300)
     near = follow(clamped, clamped, designed)
-    far = follow(hard(loads), clamped, designed, late=1)
+    u = designed.uncertainty
+    far = follow(hard(loads, u), clamped, designed, late=u.samples)
     apart, softest = spread(clamped, loads, designed, (LOCKED,)), softness(clamped, designed, grid)
     return AtRate(
         designed,

@@ -14,7 +14,7 @@ from rsea_ros.control.grid import Lateness, Tolerance
 from rsea_ros.control.law import Gains
 from rsea_ros.control.link import LinkShare
 from rsea_ros.control.synthesis import ControllerDesign, DesignLimits, check, design
-from rsea_ros.control.uncertainty import LIGHTEST, lightest, load_range
+from rsea_ros.control.uncertainty import LIGHTEST, lightest, load_range, load_uncertainty
 from rsea_ros.errors import ParameterError
 from rsea_ros.hardware.device import State
 from rsea_ros.model.rig_file import load_rig
@@ -30,6 +30,7 @@ LIMITS = ("torque_limit", "slew_limit", "error_limit", "error_time", "ft_limit")
 TABLE = live((
     NodeParameter("rig", "paper_high_impedance", "the bench: a name of config/rigs, or a model.yaml"),
     NodeParameter("free", "", f"rig whose ends are the lightest load; empty: rig's, {LIGHTEST} if clamped"),
+    NodeParameter("uncertainty", "", "YAML of what it must tolerate (docs/control.md); empty: from the rig"),
     NodeParameter("rate", 280.0, "measurements a second", "Hz", 50.0, 1000.0),
     AXIS,
     NodeParameter("k_p", -1.0, "gain on the torque error; -1: all five gains by synthesis", "", -1.0, 1e4),
@@ -41,7 +42,7 @@ TABLE = live((
     NodeParameter("k_w", -1.0, "damping of the gear about the model; -1: see k_p", "N m s/rad", -1.0, 1e4),
     NodeParameter("sensitivity", 2.0, "largest of the rig itself, with every load", "", 1.1, 5.0),
     NodeParameter("robust", 3.0, "largest sensitivity of the whole set of benches", "", 1.1, 20.0),
-    NodeParameter("impedance", 1.2, "largest output impedance over that of the bare spring", "", 1.0, 20.0),
+    NodeParameter("impedance", 2.0, "largest output impedance over that of the bare spring", "", 1.0, 20.0),
     NodeParameter("compensate", True, "whether friction, ripple and backlash of the rig are compensated"),
     NodeParameter("learn", True, "whether load and drive are learned; not inside an outer impedance loop"),
     NodeParameter(
@@ -87,13 +88,14 @@ def design_of(values: Values) -> ControllerDesign:
     rig = load_rig(values["rig"])
     loads = load_range(rig, lightest(rig, values["free"]))
     stated = [values[name] for name in GAINS]
+    u = load_uncertainty(values["uncertainty"], rig, values["rate"]) if values["uncertainty"] else None
     if all(value >= 0.0 for value in stated):
-        return check(rig, loads, values["rate"], Gains(*stated))
+        return check(rig, loads, values["rate"], Gains(*stated), u)
     if any(value >= 0.0 for value in stated):
         given = ", ".join(f"{value:g}" for value in stated)
         raise ParameterError(f"parameters {', '.join(GAINS)} = {given}, expected all five, or -1 for all")
     names = ("sensitivity", "robust", "impedance")
-    return design(rig, loads, values["rate"], DesignLimits(*(values[name] for name in names)))
+    return design(rig, loads, values["rate"], DesignLimits(*(values[name] for name in names)), u)
 
 
 def torque_limits(values: Values) -> TorqueLimits:

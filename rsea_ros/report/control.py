@@ -20,10 +20,7 @@ from rsea_ros.report.result_files import Provenance, pick
 
 _COLOURS = (fig.AFTER, fig.BEFORE, fig.TRUTH)
 
-BAND = (
-    "Band: all benches of the set with that load (K_s ± 10 %, b_m ± 50 %, one sample and 2 ms late, the mode "
-    "of 33 Hz at the sensor, whose own ringing is not in the torque)."
-)
+BAND = "Band: all benches of the set with that load ({}); the ringing of a mode is not in the torque."
 LEARNING = (
     "Here the loads are half, once and twice the inertia. Slow or small motion teaches nothing of the load; "
     "then only feedback is left."
@@ -91,7 +88,8 @@ def _following_figure(study: Study, rig: Rig, title: str, load: str, more: str =
     hz = np.geomspace(1.0, 0.45 * max(at.design.rate for at in study.rates), 300)
     opened = end_response(rig, hz)
     curves.append(ResponseCurve("without control", fig.MEASURED, hz, opened, 1.2, "dot"))
-    caption = f"Distal over desired torque, 1 N·m, sine by sine, in simulation. {BAND} {more}".strip()
+    caption = "Distal over desired torque, 1 N·m, sine by sine, in simulation. "
+    caption = f"{caption}{BAND.format(study.rates[0].design.uncertainty)} {more}".strip()
     marks = [Mark(3.0 * study.resonance, "3 × resonance")]
     return response_figure(title, curves, marks, caption, (-50.0, 15.0))
 
@@ -211,14 +209,17 @@ def _reach(reach: Reach) -> str:
 
 
 def gains_words(study: Study) -> Sequence[str]:
-    """Return the gains of each rate, a line each."""
+    """Return the gains of each rate, a line each, and the set that they tolerate."""
+    sets = list(dict.fromkeys(str(at.design.uncertainty) for at in study.rates))
+    mode = all(at.design.uncertainty.mode is None for at in study.rates)
+    none = "; no mode of the F/T sensor's mount is assumed (--uncertainty states one)" if mode else ""
     return [
         words.minus(
             f"{design.rate:g} Hz: k_p = {g.k_p:.3f}, k_d = {1e3 * g.k_d:.2f} ms, k_i = {g.k_i:.2f}, Q "
             f"{g.q_frequency:.1f} Hz, k_w = {g.k_w:.1f} N·m·s/rad"
         )
         for design, g in ((at.design, at.design.gains) for at in study.rates)
-    ]
+    ] + [f"tolerated: {' or '.join(sets)}{none}"]
 
 
 def control_tables(study: Study) -> list[Html]:

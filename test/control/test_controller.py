@@ -296,3 +296,18 @@ def test_readings_that_stay_unusable_end_the_torque_and_the_next_begins_anew():
         if 115 <= k < 130:
             assert torque == 0.0
     assert torque == pytest.approx(10.0, abs=1.0)
+
+
+@pytest.mark.parametrize("bench", [RIG, FREE])
+def test_an_encoder_alone_serves(bench):
+    """Without a velocity it is that of the last three positions, without a lag."""
+    plant = Plant(bench, RATE)
+    controller = TorqueController(RIG, RATE, GAINS, settings=ControllerSettings(velocity=False))
+    sample, pending, off, amplitude = plant.step(0.0), 0.0, [], 4.2
+    for k in range(1120):
+        t = k / RATE
+        wanted = amplitude * min(1.0, 4.0 * t) ** 2 * math.sin(2.0 * math.pi * 5.0 * t)
+        off.append(sample.ft - wanted)
+        command = controller.step(Measurement(sample.ft, math.nan, sample.position), wanted)
+        sample, pending = plant.step(pending), command
+    assert np.sqrt(2.0 * np.mean(np.square(off[840:]))) < 0.03 * amplitude

@@ -55,6 +55,6 @@ def test_the_simulated_actuator_stops_following_at_its_reach():
 
 
 def test_a_controller_takes_the_torque_of_the_motor_that_its_rig_states():
-    assert TorqueLimits.of(RIG).torque == TorqueLimits().torque == 68.0
+    assert TorqueLimits.of(RIG).torque == 68.0
     assert TorqueLimits.of(RIG.with_effect("torque_saturation", limit=12.0)).torque == 12.0
     assert TorqueLimits.of(load_rig("pd_joint")).torque == load_rig("pd_joint")["controller.torque_limit"]

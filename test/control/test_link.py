@@ -13,20 +13,21 @@ from rsea_ros.control.law import Gains, law_of
 from rsea_ros.control.link import LinkMotion, LinkShare, link_share
 from rsea_ros.control.margins import distal_responses, link_response
 from rsea_ros.control.study import disturbed_rig, lagging_corners
-from rsea_ros.control.synthesis import ControllerDesign
+from rsea_ros.control.synthesis import ControllerDesign, DesignLimits
 from rsea_ros.control.uncertainty import Uncertainty, load_range
 from rsea_ros.model.rig_file import load_rig
 
 RATE = 280.0
 RIG, FREE = load_rig("paper_high_impedance"), load_rig("paper_moving_output")
 GAINS = Gains(0.2575, 0.003029, 1.195, 6.99, 42.9)
-DESIGN = ControllerDesign(GAINS, RATE, {}, math.nan)
+SET = Uncertainty(delay=2e-3, mode=(33.0, 0.02, 0.3))
+DESIGN = ControllerDesign(GAINS, RATE, {}, math.nan, uncertainty=SET)
 LAW, SHARE = law_of(RIG, RATE, GAINS), LinkShare(0.25, 0.4, 20.0)
 HZ = np.array([1.0, 5.0, 20.0])
 
 
 def test_parts_are_chosen_that_every_bench_of_the_set_stands():
-    chosen = link_share(RIG, load_range(RIG, FREE), DESIGN)
+    chosen = link_share(RIG, load_range(RIG, FREE), DESIGN, DesignLimits(impedance=1.2))
     assert chosen == SHARE
 
 
@@ -52,7 +53,7 @@ def test_a_free_load_is_followed_no_worse():
 def test_a_free_load_with_little_drag_and_all_of_the_lag_comes_to_rest(load):
     """In full, inertia and drag are gone for the load and the lag swings a pendulum up."""
     loads = load_range(RIG, FREE)
-    little_drag = replace(lagging_corners(load)[0], damping=1.0 - Uncertainty().damping)
+    little_drag = replace(lagging_corners(load, SET)[0], damping=1.0 - SET.damping)
     true = disturbed_rig(loads, little_drag)
     wanted = np.where(np.arange(1120) < 60, 2.0, 0.0)
     controller = TorqueController(RIG, RATE, GAINS, link=SHARE, settings=ControllerSettings(learn=False))

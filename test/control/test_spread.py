@@ -14,15 +14,18 @@ from rsea_ros.control.uncertainty import LOCKED, Uncertainty, load_range, mode_o
 from rsea_ros.model.rig_file import load_rig
 
 RIG, FREE = load_rig("paper_high_impedance"), load_rig("paper_moving_output")
-DESIGN = ControllerDesign(Gains(0.2575, 0.003029, 1.195, 6.99, 42.9), 280.0, {}, math.nan)
+SET = Uncertainty(delay=2e-3, mode=(33.0, 0.02, 0.3))
+DESIGN = ControllerDesign(
+    Gains(0.2575, 0.003029, 1.195, 6.99, 42.9), 280.0, {}, math.nan, uncertainty=SET
+)
 LOADS = load_range(RIG, FREE)
 
 
 def test_a_simulated_bench_of_the_set_lies_within_the_band():
     """The mode rings in the sensor and not in the torque, so it is taken out of what the sensor read."""
     apart, near = spread(RIG, LOADS, DESIGN, (LOCKED,)), follow(RIG, RIG, DESIGN, learn=False)
-    far = follow(hard(LOADS), RIG, DESIGN, late=1, learn=False)
-    mode = mode_of(Uncertainty().mode, Uncertainty().mode[2], far.hz)
+    far = follow(hard(LOADS, SET), RIG, DESIGN, late=1, learn=False)
+    mode = mode_of(SET.mode, far.hz)
     beyond = 20.0 * np.log10(np.abs(far.torque / mode / near.torque))
     low, high = (np.interp(far.hz, apart.hz, edge) for edge in apart.gain)
     below = far.hz < 60.0  # above, the delay of 2 ms is not that of a held command

@@ -11,7 +11,7 @@ from rsea_ros.control.margins import impedance
 from rsea_ros.control.robustness import robustness
 from rsea_ros.control.study import EFFECTS, lagging_corners, sine, tracking_error
 from rsea_ros.control.synthesis import check, design
-from rsea_ros.control.uncertainty import LOCKED, load_range
+from rsea_ros.control.uncertainty import LOCKED, Uncertainty, load_range
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
@@ -46,14 +46,14 @@ def test_no_neighbour_that_keeps_the_demands_is_clearly_better(designed):
 def test_the_designed_controller_meets_its_limits(designed):
     """At the rate of the nodes. `rsea control` prints more trials of the same kinds (golden: at 140 Hz)."""
     swept = robustness(RIG, LOADS, designed)
-    assert swept.cases > 1000 and swept.unstable == 0 and swept.sensitivity < 3.15
+    assert swept.cases == 400 and swept.unstable == 0 and swept.sensitivity < 3.15
     for margins in designed.margins.values():  # |S| <= 2 is 6 dB and 29 degrees
         assert margins.sensitivity <= 2.02 and margins.phase >= 28.9 and margins.gain >= 5.95
     assert sine(RIG, RIG, designed) < 0.02 and follow(RIG, RIG, designed).bandwidth > 19.1
     rough = RIG.with_effects(EFFECTS[0])
     assert sine(rough, RIG, designed) < 0.06 and sine(rough, rough, designed) < 0.025
     for load, most in ((LOCKED, 0.08), ("free x 0.5", 0.05)):
-        stiff, _ = lagging_corners(load)
+        stiff, _ = lagging_corners(load, designed.uncertainty)
         assert tracking_error(RIG, LOADS, stiff, designed) < most, load
 
 
@@ -61,7 +61,7 @@ def test_gains_of_the_nominal_bench_alone_are_refused_for_the_set():
     """They had 45 degrees of phase margin locked and 35 free, and were unstable with 2 ms and the mode."""
     eager = Gains(1.469, 0.01116, 0.0, 89.2, 0.0)
     with pytest.raises(ParameterError, match=r"unstable at 280 Hz with load .* mode"):
-        check(RIG, LOADS, RATE, eager)
+        check(RIG, LOADS, RATE, eager, Uncertainty(delay=2e-3, mode=(33.0, 0.02, 0.3)))
 
 
 def test_a_bench_that_lags_gets_gentler_gains(designed):

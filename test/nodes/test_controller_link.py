@@ -10,6 +10,7 @@ from rsea_ros.control.law import Gains
 from rsea_ros.control.link import LinkShare
 from rsea_ros.control.spring_encoder import SpringEncoder
 from rsea_ros.control.synthesis import ControllerDesign
+from rsea_ros.control.uncertainty import Uncertainty
 from rsea_ros.model.rig import EffectSetting, Sensor
 from rsea_ros.model.rig_file import load_rig, save_rig
 from rsea_ros.model.simulation import Plant
@@ -19,7 +20,8 @@ from rsea_ros.nodes._link import link_of, link_values, link_words
 
 RATE = 280.0
 EPOCH, PERIOD = 1_700_000_000_000_000_000, 1e9 / RATE
-DESIGN = ControllerDesign(Gains(0.2575, 0.003029, 1.195, 6.99, 42.9), RATE, {}, math.nan)
+SET = Uncertainty(delay=2e-3, mode=(33.0, 0.02, 0.3))
+DESIGN = ControllerDesign(Gains(0.2575, 0.003029, 1.195, 6.99, 42.9), RATE, {}, math.nan, uncertainty=SET)
 ENCODER = {"deflection": Sensor(noise=5e-6)}
 
 
@@ -34,7 +36,7 @@ def values(rig, path, **given):
 
 
 def test_it_is_used_where_the_rig_has_the_sensor(tmp_path):
-    link = link_of(values(bench(), tmp_path), DESIGN)
+    link = link_of(values(bench(), tmp_path, impedance=1.2), DESIGN)
     assert link.share == LinkShare(0.25, 0.4, 20.0) and link.encoder is not None
     assert "once deflection agrees with ft" in link_words(link)
     assert link_values(link)["link"].startswith("not used: deflection and ft have not been compared")
