@@ -8,9 +8,9 @@ from rsea_ros.errors import DeviceError
 from rsea_ros.hardware.device import State
 from rsea_ros.hardware.dynamixel.control_tables import MotorConnection, usual_latency
 from rsea_ros.hardware.dynamixel.motor import Motor
-from rsea_ros.hardware.dynamixel_netft import DynamixelNetft
 from rsea_ros.hardware.guarded import GuardedDevice
 from rsea_ros.hardware.limits import Limits
+from rsea_ros.hardware.motor_netft import MotorNetft
 from rsea_ros.hardware.netft.sensor import SensorConnection
 from rsea_ros.hardware.peer.remote import RemoteBench
 from rsea_ros.nodes._devices import limits_of
@@ -28,7 +28,7 @@ class Loop:
     def __init__(self, bench: RemoteBench, limits: Limits | None = None, supervisor: str = "") -> None:
         limits = limits or limits_of({p.name: p.default for p in TABLE})
         self.bench = bench
-        self.device = DynamixelNetft(
+        self.device = MotorNetft(
             Motor(MotorConnection(bench.port, 4_000_000, latency=usual_latency(RATE), supervisor=supervisor)),
             SensorConnection("127.0.0.1", bench.ft_port, bench.page_port, 0.01), limits, STIFFNESS,
         )  # fmt: skip

@@ -8,12 +8,12 @@ from msg_adapters.topic_map import sign_and_index
 from rsea_ros.errors import ParameterError, RseaError
 from rsea_ros.hardware.device import Device, Spring
 from rsea_ros.hardware.dynamixel.control_tables import MotorConnection, usual_latency
-from rsea_ros.hardware.dynamixel.encoder import EncoderConnection
+from rsea_ros.hardware.dynamixel.encoder import BusEncoder, EncoderConnection
 from rsea_ros.hardware.dynamixel.line import Line, LineMotor
 from rsea_ros.hardware.dynamixel.motor import Motor
 from rsea_ros.hardware.dynamixel.port import BAUD_RATES
-from rsea_ros.hardware.dynamixel_netft import DynamixelNetft
 from rsea_ros.hardware.limits import UNRATED, Limits, Rating
+from rsea_ros.hardware.motor_netft import MotorNetft
 from rsea_ros.hardware.netft.sensor import SensorConnection
 from rsea_ros.hardware.outside import outside_device
 from rsea_ros.hardware.witnesses import Actuator, Witnesses
@@ -182,13 +182,14 @@ def dynamixel_netft(values: Values, line: Line | None = None) -> Device:
     motor = MotorConnection(values["port"], identity=values["id"], latency=latency_of(values), **own)
     sensor = SensorConnection(*(values[f"ft_{name}"] for name in ("host", "port", "page_port", "timeout")))
     stiffness = math.inf if rig.rigid_spring else rig["spring.stiffness"]
-    return DynamixelNetft(
-        Motor(motor) if line is None else LineMotor(motor, line),
+    made, encoder = Motor(motor) if line is None else LineMotor(motor, line), _encoder(values)
+    return MotorNetft(
+        made,
         sensor if values["ft_host"] else None,
         limits_of(values),
         stiffness,
         absolute=values["position_zero"] == "motor",
-        encoder=_encoder(values),
+        encoder=BusEncoder(encoder, made.port) if encoder is not None else None,
     )
 
 

@@ -11,9 +11,9 @@ import pytest
 from rsea_ros.hardware.device import NoReply
 from rsea_ros.hardware.dynamixel.control_tables import MotorConnection
 from rsea_ros.hardware.dynamixel.motor import Motor
-from rsea_ros.hardware.dynamixel_netft import DynamixelNetft
 from rsea_ros.hardware.guarded import GuardedDevice
 from rsea_ros.hardware.limits import Limits
+from rsea_ros.hardware.motor_netft import MotorNetft
 from rsea_ros.hardware.netft.sensor import SensorConnection
 
 PERIOD = 1.0 / 280.0
@@ -26,7 +26,7 @@ def device_on(bench, limits=None, *, absolute=False, **motor):
     """Return the driver's device on a bench."""
     settings = MotorConnection(bench.port, 4_000_000, **{"latency": LATENCY, "watchdog": WATCHDOG, **motor})
     sensor = SensorConnection("127.0.0.1", bench.ft_port, bench.page_port, FT_TIMEOUT)
-    return DynamixelNetft(Motor(settings), sensor, limits or Limits(68.0), STIFFNESS, absolute=absolute)
+    return MotorNetft(Motor(settings), sensor, limits or Limits(68.0), STIFFNESS, absolute=absolute)
 
 
 class Loop:

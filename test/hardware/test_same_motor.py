@@ -7,8 +7,8 @@ from types import SimpleNamespace
 import pytest
 
 from rsea_ros.errors import DeviceError
+from rsea_ros.hardware.bus_motor import Unwrapper
 from rsea_ros.hardware.device import NoReply
-from rsea_ros.hardware.dynamixel.encoder import Unwrapper
 from rsea_ros.hardware.dynamixel.own_limits import Watchlist
 from rsea_ros.hardware.interlock import DeviceFault
 from rsea_ros.hardware.limits import Limits
