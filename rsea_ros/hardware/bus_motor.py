@@ -30,10 +30,10 @@ def repeat(transaction: Callable[[], T]) -> T:
 
 
 class Unwrapper:
-    """Counts of an encoder that go on where their bits wrap round."""
+    """Counts of an encoder that go on where they begin anew, after `period` of them."""
 
-    def __init__(self, bits: int = 32) -> None:
-        self._half = 1 << (bits - 1)
+    def __init__(self, period: int = 1 << 32) -> None:
+        self._period = period
         self._last: int | None = None
 
     def restart(self) -> None:
@@ -41,9 +41,9 @@ class Unwrapper:
         self._last = None
 
     def take(self, counts: int) -> int:
-        """Return the counts nearest to the last ones, modulo all that the bits can say."""
-        last = counts if self._last is None else self._last
-        self._last = last + (counts - last + self._half) % (2 * self._half) - self._half
+        """Return the counts nearest to the last ones, modulo the period."""
+        last, half = counts if self._last is None else self._last, self._period // 2
+        self._last = last + (counts - last + half) % self._period - half
         return self._last
 
 
