@@ -51,7 +51,12 @@ def value(counts: int, most: float, bits: int) -> float:
 
 
 class Frames:
-    """Frames of one drive. Standard identifiers: CubeMars, Damiao, mini-cheetah."""
+    """Frames of one drive. Standard identifiers: CubeMars, Damiao, mini-cheetah.
+
+    tell_is_answered: the readings that the writing of a register is answered by.
+    """
+
+    tell_is_answered = 0
 
     def __init__(self, table: DriveTable, identity: int, host: int = -1) -> None:
         self.table, self.identity = table, identity
@@ -139,6 +144,8 @@ class Frames:
 
 class ExtendedFrames(Frames):
     """Frames with the kind, the sender and part of the values in an identifier of 29 bits: RobStride."""
+
+    tell_is_answered = 1
 
     def __init__(self, table: DriveTable, identity: int, host: int = -1) -> None:
         super().__init__(table, identity, host)

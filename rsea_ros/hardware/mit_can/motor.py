@@ -57,7 +57,7 @@ class MitMotor(BusMotor):
         self.port = CanPort(settings.interface, settings.channel, settings.baud)
         self._latency = settings.latency
         self._open = self._on = self._asked = False
-        self._sent = self._owed = self._twins = 0
+        self._sent = self._heard = self._owed = self._twins = 0
         self._counts = Unwrapper(self.table.wraps or 1 << 32)
         self._registers: dict[str, float] = {}
 
@@ -109,23 +109,12 @@ class MitMotor(BusMotor):
         self._asked = False
         if meanwhile is not None:
             meanwhile()
-        deadline = self._sent + round(1e9 * self._latency)
-        feedback, instant = None, self._sent
-        while self._owed > 0 and (heard := self._hear(self._frames.feedback, deadline)) is not None:
-            feedback, instant = heard, (self._sent + time.monotonic_ns()) // 2
-            self._owed -= 1
-        if feedback is None:
-            self.port.errors["lost"] += 1
-            raise NoReply(f"{self.name}: no answer in {1e3 * self._latency:.3g} ms")
-        self._owed = 0
-        return self._sample(feedback, instant)
-
-    def _sample(self, feedback: Feedback, instant: int) -> MotorSample:
+        feedback = self._newest(self._latency)
         table, counts = self.table, feedback.counts
         if table.wraps:
             counts = self._counts.take(counts)
         return MotorSample(
-            instant=instant,
+            instant=(self._sent + self._heard) // 2,
             position=value(counts, table.position, 16),
             velocity=feedback.velocity,
             torque=feedback.torque,
@@ -214,7 +203,7 @@ class MitMotor(BusMotor):
 
     def _set(self, name: str, number: int) -> None:
         """Write a register, and read it again. Raises DeviceError where it is not as written."""
-        self._send(self._frames.tell(name, number))
+        self._send(self._frames.tell(name, number), answers=self._frames.tell_is_answered)
         if (now := self._register(name)) != number:
             raise DeviceError(f"{self.name}: {name} is {now}, expected {number}")
 
@@ -223,7 +212,7 @@ class MitMotor(BusMotor):
         self._on = on
         frame = self._frames.enable() if on else self._frames.disable()
         for _ in range(ATTEMPTS):
-            feedback = self._ask(frame, self._frames.feedback)
+            feedback = self._ask_state(frame)
             if not self.table.on or (feedback.state == self.table.on) == on:
                 return feedback
             frame = self._frames.command(0.0) if on else frame
@@ -264,8 +253,11 @@ class MitMotor(BusMotor):
         self._open = self._on = False
         self.port.close()
 
-    def _send(self, frame: Frame) -> None:
-        """Send a frame after all that has arrived is counted: answers that are late, or too many."""
+    def _send(self, frame: Frame, *, answers: int = 1) -> None:
+        """Send a frame after all that has arrived is counted: readings that are late, or too many.
+
+        answers: the readings that it is answered by.
+        """
         late = more = 0
         while (heard := self.port.receive(0.0)) is not None:
             if self._frames.feedback(heard) is not None:
@@ -274,27 +266,48 @@ class MitMotor(BusMotor):
         self.port.errors += {"stale": late, "twice": more}
         self._twins = self._twins + 1 if more else 0
         self.port.send(frame)
-        self._sent, self._owed = time.monotonic_ns(), self._owed + 1
+        self._sent, self._owed = time.monotonic_ns(), self._owed + answers
 
     def _request(self, frame: Frame) -> None:
         self._asked = False
         self._send(frame)
         self._asked = True
 
+    def _newest(self, patience: float) -> Feedback:
+        """Return the last of the readings that are owed, or that come in time (s). Raises NoReply, PortLost."""
+        newest, deadline = None, self._sent + round(1e9 * patience)
+        while self._owed > 0 and (feedback := self._hear(self._frames.feedback, deadline)) is not None:
+            newest, self._heard, self._owed = feedback, time.monotonic_ns(), self._owed - 1
+        if newest is None:
+            raise self._lost(patience)
+        self._owed = 0
+        return newest
+
+    def _ask_state(self, frame: Frame) -> Feedback:
+        """Return the reading after a frame, outside the cycle. Raises NoReply, PortLost."""
+
+        def transaction() -> Feedback:
+            self._send(frame)
+            return self._newest(max(PATIENCE, self._latency))
+
+        return repeat(transaction)
+
     def _ask(self, frame: Frame, take: Callable[[Frame], T | None]) -> T:
         """Return what is taken from the answer to a frame, outside the cycle. Raises NoReply, PortLost."""
         patience = max(PATIENCE, self._latency)
 
         def transaction() -> T:
-            self._send(frame)
+            self._send(frame, answers=0)
             answer = self._hear(take, self._sent + round(1e9 * patience))
-            self._owed = 0
             if answer is None:
-                self.port.errors["lost"] += 1
-                raise NoReply(f"{self.name}: no answer in {1e3 * patience:g} ms")
+                raise self._lost(patience)
             return answer
 
         return repeat(transaction)
+
+    def _lost(self, patience: float) -> NoReply:
+        self.port.errors["lost"] += 1
+        return NoReply(f"{self.name}: no answer in {1e3 * patience:.3g} ms")
 
     def _hear(self, take: Callable[[Frame], T | None], deadline: int) -> T | None:
         """Return what is taken from the first frame that has it until an instant, None without."""
@@ -303,5 +316,7 @@ class MitMotor(BusMotor):
             frame = self.port.receive(max(0.0, left / 1e9))
             if frame is not None and (taken := take(frame)) is not None:
                 return taken
+            if frame is not None and self._owed and self._frames.feedback(frame) is not None:
+                self._owed -= 1
             if frame is None and left <= 0:
                 return None
