@@ -274,7 +274,7 @@ class MitMotor(BusMotor):
         self._asked = True
 
     def _newest(self, patience: float) -> Feedback:
-        """Return the last of the readings that are owed, or that come in time (s). Raises NoReply, PortLost."""
+        """Return the last of the readings that are owed, of those in time (s). Raises NoReply, PortLost."""
         newest, deadline = None, self._sent + round(1e9 * patience)
         while self._owed > 0 and (feedback := self._hear(self._frames.feedback, deadline)) is not None:
             newest, self._heard, self._owed = feedback, time.monotonic_ns(), self._owed - 1
