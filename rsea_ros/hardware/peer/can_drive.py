@@ -54,7 +54,7 @@ class EmulatedDrive(EmulatedMotor):
         self.kind = model = DRIVES[name]
         self._items: dict[str, float] = {
             "id": 1, "host": 0xFD if model.family == "rs" else 0, "torque_enable": 0, "hardware_error": 0,
-            "temperature": 32, "origin": 0.3, "control_mode": int(model.family == "dm"), "timeout": 0,
+            "temperature": 32, "voltage": 240, "origin": 0.3, "control_mode": int(model.family == "dm"), "timeout": 0,
             "torque_limit": model.t, "number": 0x1122334455667788, "p": model.p, "v": model.v, "t": model.t,
             "hot": 100.0, "firmware": 5001, "return_delay": 0,
         }  # fmt: skip
