@@ -54,9 +54,9 @@ class EmulatedDrive(EmulatedMotor):
         self.kind = model = DRIVES[name]
         self._items: dict[str, float] = {
             "id": 1, "host": 0xFD if model.family == "rs" else 0, "torque_enable": 0, "hardware_error": 0,
-            "temperature": 32, "voltage": 240, "origin": 0.3, "control_mode": int(model.family == "dm"), "timeout": 0,
-            "torque_limit": model.t, "number": 0x1122334455667788, "p": model.p, "v": model.v, "t": model.t,
-            "hot": 100.0, "firmware": 5001, "return_delay": 0,
+            "temperature": 32, "voltage": 240, "origin": 0.3, "timeout": 0, "return_delay": 0,
+            "control_mode": int(model.family == "dm"), "torque_limit": model.t, "number": 0x1122334455667788,
+            "p": model.p, "v": model.v, "t": model.t, "hot": 100.0, "firmware": 5001,
         }  # fmt: skip
         self._command = (0.0,) * 5
 
@@ -236,5 +236,6 @@ class EmulatedCan(EmulatedBus):
         name = f"T{identity:08X}" if extended else f"t{identity:03X}"
         packet = f"{name}{len(data)}{data.hex().upper()}\r".encode()
         when = now + (round(self._wrong.late * 1e9) if self._wrong.happens("delay") else 0)
+        when = max([when, *(before for before, _ in self._waiting)])  # nothing overtakes on a bus
         self._waiting += [(when, packet)] * (2 if self._wrong.happens("twin") else 1)
         self.sent.append((now, identity, data))
