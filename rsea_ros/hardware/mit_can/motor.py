@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
+from itertools import cycle
 
 from rsea_ros.errors import DeviceError, ParameterError
 from rsea_ros.hardware.bus_motor import ATTEMPTS, BusMotor, MotorSample, T, Unwrapper, repeat
@@ -60,6 +61,7 @@ class MitMotor(BusMotor):
         self._sent = self._heard = self._owed = self._twins = 0
         self._counts = Unwrapper(self.table.wraps or 1 << 32)
         self._registers: dict[str, float] = {}
+        self._marks = cycle(self.table.registers)
 
     @property
     def rating(self) -> Rating:
@@ -102,7 +104,6 @@ class MitMotor(BusMotor):
     def read(self, meanwhile: Callable[[], None] | None = None) -> MotorSample:
         """Return the answer to the last command, or to a request of its own. Raises NoReply, PortLost.
 
-        An answer that was lost before may be late: then the newest of all that come in time counts.
         """
         if not self._asked:
             self.write(0.0)
@@ -274,11 +275,30 @@ class MitMotor(BusMotor):
         self._asked = True
 
     def _newest(self, patience: float) -> Feedback:
-        """Return the last of the readings that are owed, of those in time (s). Raises NoReply, PortLost."""
+        """Return the last of the readings that are owed, of those in time (s). Raises NoReply, PortLost.
+
+        A reading has no number. After one that was lost a register is asked for, where there are any: what
+        comes before its answer is all that was owed, and without that answer the reading may be an old one.
+        """
         newest, deadline = None, self._sent + round(1e9 * patience)
-        while self._owed > 0 and (feedback := self._hear(self._frames.feedback, deadline)) is not None:
-            newest, self._heard, self._owed = feedback, time.monotonic_ns(), self._owed - 1
-        if newest is None:
+        mark: Callable[[Frame], float | None] | None = None
+        if self._owed > 1 and self.table.registers:
+            register = next(self._marks)
+            self.port.send(self._frames.ask(register))
+            mark = self._frames.answer(register)
+
+        def take(frame: Frame) -> Feedback | float | None:
+            return self._frames.feedback(frame) or (mark(frame) if mark is not None else None)
+
+        while self._owed > 0 or mark is not None:
+            heard = self._hear(take, deadline)
+            if heard is None:
+                break
+            if isinstance(heard, Feedback):
+                newest, self._heard, self._owed = heard, time.monotonic_ns(), max(self._owed - 1, 0)
+            else:
+                self._owed, mark = 0, None
+        if newest is None or mark is not None:
             raise self._lost(patience)
         self._owed = 0
         return newest
