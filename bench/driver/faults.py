@@ -165,7 +165,7 @@ def faults_on_can(model: str) -> dict[str, Trial]:
     trials = {name: trial for name, trial in FAULTS.items() if any(word in name for word in ON_ANY_BUS)}
     trials |= {
         "two motors of one ID": misbehaves(QUICK + 2.0, twin=True),
-        "position jumps by 0.5 rad": reads("origin", 0.8, 0.3),
+        "position jumps by 0.5 rad": reads("origin", 800, 300),
         "two fifths of the replies dropped": misbehaves(2000.0, drop=0.4),
         "torque switched off": reads("torque_enable", 0, 0, 40.0 if model[0] in "Am" else QUICK),
     }

@@ -43,7 +43,7 @@ Message = tuple[int, bool, bytes]
 
 class EmulatedDrive(EmulatedMotor):
     """One drive. Its items: id, host, torque_enable, hardware_error (code or bits of its family), temperature
-    °C, origin rad, control_mode, timeout, torque_limit, number, and the ranges p, v, t that it is set to.
+    °C, origin mrad, control_mode, timeout, torque_limit, number, and the ranges p, v, t that it is set to.
 
     `history` has N mm of the commanded torque, 0 where that is next to zero, which no count is.
     """
@@ -54,7 +54,7 @@ class EmulatedDrive(EmulatedMotor):
         self.kind = model = DRIVES[name]
         self._items: dict[str, float] = {
             "id": 1, "host": 0xFD if model.family == "rs" else 0, "torque_enable": 0, "hardware_error": 0,
-            "temperature": 32, "voltage": 240, "origin": 0.3, "timeout": 0, "return_delay": 0,
+            "temperature": 32, "voltage": 240, "origin": 300, "timeout": 0, "return_delay": 0,
             "control_mode": int(model.family == "dm"), "torque_limit": model.t, "number": 0x1122334455667788,
             "p": model.p, "v": model.v, "t": model.t, "hot": 100.0, "firmware": 5001,
         }  # fmt: skip
@@ -93,7 +93,7 @@ class EmulatedDrive(EmulatedMotor):
         if not self.get("torque_enable"):
             return 0.0
         position, velocity, _ = self._motion()
-        torque = kp * (p - position - self._items["origin"]) + kd * (v - velocity) + t
+        torque = kp * (p - position - 1e-3 * self._items["origin"]) + kd * (v - velocity) + t
         return max(-self._items["t"], min(self._items["t"], torque))
 
     def acting_goal(self) -> int:
@@ -157,7 +157,7 @@ class EmulatedDrive(EmulatedMotor):
             if wish == "clear":
                 self.put("hardware_error", 0)
         elif wish == "zero":
-            self.put("origin", -self._motion()[0])
+            self.put("origin", -1e3 * self._motion()[0])
         self._act(now)
 
     def _take(self, now: int, counts: Sequence[int], bits: Sequence[int]) -> None:
@@ -174,7 +174,7 @@ class EmulatedDrive(EmulatedMotor):
         """Return the data of a reading, packed as the firmware does: cut off, not rounded."""
         position, velocity, torque = self._motion()
         p, v, t = (self._items[name] for name in "pvt")
-        whole = int((position + self._items["origin"] + p) * 65535 / (2 * p) // 1)
+        whole = int((position + 1e-3 * self._items["origin"] + p) * 65535 / (2 * p) // 1)
         if self.kind.family == "rs":
             counts = [whole % 65535, _cut(velocity, v, 65535), _cut(torque, t, 65535)]
             return struct.pack(">4H", *counts, 10 * self.get("temperature"))
