@@ -26,6 +26,7 @@ BEGUN = "Installing collected packages"
 """What pip says once it changes the environment."""
 PARTS = {
     "dev": "pytest, ruff and mypy, about 130 MB",
+    "can": "python-can, about 3 MB",
     "fleet": "Dask, Parquet and DuckDB, about 280 MB",
     "export": "MuJoCo and FMPy, about 230 MB",
 }

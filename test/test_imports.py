@@ -87,7 +87,7 @@ FOREIGN = {
     "watch": {"tornado"},
     "benchmark": {"numpy"},
     "library": {"numpy", "plotly", "rich"},
-    "hardware": {"numpy", "dynamixel_sdk", "serial"},
+    "hardware": {"numpy", "dynamixel_sdk", "serial", "can"},
     "msg_adapters": {"numpy", "scipy", "yaml", "rosbags", "lz4", "backports", "compression"}
     | {"pyarrow"}
     | MESSAGES,

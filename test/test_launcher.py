@@ -22,7 +22,7 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 ROOT = Path(__file__).resolve().parents[1]
-USED = ("run", "ros", "fleet", "export", "dev")
+USED = ("run", "ros", "can", "fleet", "export", "dev")
 """Locks of which `./rsea test` makes its environment."""
 PACKAGE = 'import sys\nprint("ran", *sys.argv[1:])\n'
 DECOY = PACKAGE if sys.version_info < (3, 11) else 'print("from the working directory")\n'

@@ -153,12 +153,48 @@ FAULTS: dict[str, Trial] = {
 }  # fmt: skip
 
 
-def faults(folder: Path) -> Iterator[tuple[str, str, str]]:
-    """Provoke each fault several times, then the requests and motors of requests.py."""
-    with RemoteBench(folder / "tty") as bench:
+ON_ANY_BUS = (
+    "silent", "replies dropped", "dropped, and", "late", "hot", "torque switched", "F/T", "driver stands",
+    "supervisor", "service stop", "asked to end", "commands cease", "adapter",
+)  # fmt: skip
+"""In the names of what happens on CAN, too, where the controllers drop a frame that is damaged."""
+
+
+def faults_on_can(model: str) -> dict[str, Trial]:
+    """Return the faults of a drive on CAN: its ID, its angle, its state, its errors by its family's codes."""
+    trials = {name: trial for name, trial in FAULTS.items() if any(word in name for word in ON_ANY_BUS)}
+    trials |= {
+        "two motors of one ID": misbehaves(QUICK + 2.0, twin=True),
+        "position jumps by 0.5 rad": reads("origin", 800, 300),
+        "two fifths of the replies dropped": misbehaves(2000.0, drop=0.4),
+        "torque switched off": reads("torque_enable", 0, 0, 40.0 if model[0] in "Am" else QUICK),
+    }
+    codes = {"D": (8, 9, 10, 11, 12, 14), "R": (1, 2, 4, 8, 16, 32), "C": (1, 2, 4, 8, 16, 32)}
+    if model[0] == "A":  # its protocol has nothing that ends an error
+        mended = ("set", {"hardware_error": 0})
+        trials |= {f"error {code}": Trial(("alert", {"bits": code}), mended) for code in range(1, 7)}
+    trials |= {f"error {code}": alerts(code) for code in codes.get(model[0], ())}
+    if model[0] in "DR":  # a watchdog of its own
+        trials = {name: trial for name, trial in trials.items() if "supervisor" not in name}
+        ends = "reboot" if model[0] == "D" else "clear"
+        trials["driver stands still for 0.3 s"] = host("stand_still", 120.0, ends)
+    del trials["a fifth of the replies dropped"]  # one reply a cycle, not two
+    if model[0] in "Am":  # no frame of theirs tells a reading from one that is two cycles old
+        del trials["replies 6 ms late"]
+    if model == "mini-cheetah":
+        trials = {name: trial for name, trial in trials.items() if "hot" not in name}
+    return trials
+
+
+def faults(folder: Path, *, can: str = "") -> Iterator[tuple[str, str, str]]:
+    """Provoke each fault several times, then the requests and motors of requests.py.
+
+    can: model of a drive on CAN instead.
+    """
+    with RemoteBench(folder / "tty", *(("--can", can) if can else ())) as bench:
         bench.hurry()
         loop = Loop(bench)
-        for name, trial in FAULTS.items():
+        for name, trial in (faults_on_can(can) if can else FAULTS).items():
             runs, again, why = _runs(loop, bench, trial)
             zero, cycles = [run.periods for run in runs], [run.cycles for run in runs]
             latched = sum(run.cause != "" for run in runs)
@@ -173,7 +209,8 @@ def faults(folder: Path) -> Iterator[tuple[str, str, str]]:
             told += f"; {again} done again: {why}" if again else ""
             yield name, asked, f"{'ok  ' if good else 'NOT '} {text}{told}"
         loop.device.close()
-    yield from requests(folder)
+    if not can:
+        yield from requests(folder)
 
 
 def _runs(loop: Loop, bench: RemoteBench, trial: Trial) -> tuple[list[Run], int, str]:

@@ -5,12 +5,14 @@ from __future__ import annotations
 import time
 
 from rsea_ros.errors import DeviceError
+from rsea_ros.hardware.bus_motor import BusMotor
 from rsea_ros.hardware.device import State
 from rsea_ros.hardware.dynamixel.control_tables import MotorConnection, usual_latency
 from rsea_ros.hardware.dynamixel.motor import Motor
-from rsea_ros.hardware.dynamixel_netft import DynamixelNetft
 from rsea_ros.hardware.guarded import GuardedDevice
 from rsea_ros.hardware.limits import Limits
+from rsea_ros.hardware.mit_can.motor import CanConnection, MitMotor
+from rsea_ros.hardware.motor_netft import MotorNetft
 from rsea_ros.hardware.netft.sensor import SensorConnection
 from rsea_ros.hardware.peer.remote import RemoteBench
 from rsea_ros.nodes._devices import limits_of
@@ -26,12 +28,17 @@ class Loop:
     """
 
     def __init__(self, bench: RemoteBench, limits: Limits | None = None, supervisor: str = "") -> None:
-        limits = limits or limits_of({p.name: p.default for p in TABLE})
+        place = {p.name: p.default for p in TABLE} | bench.parameters()
+        limits, model = limits or limits_of(place), str(place["can_model"])
         self.bench = bench
-        self.device = DynamixelNetft(
-            Motor(MotorConnection(bench.port, 4_000_000, latency=usual_latency(RATE), supervisor=supervisor)),
-            SensorConnection("127.0.0.1", bench.ft_port, bench.page_port, 0.01), limits, STIFFNESS,
+        motor: BusMotor = (
+            MitMotor(CanConnection(bench.port, model, interface="slcan", latency=usual_latency(RATE, 1),
+                                   supervisor=supervisor))
+            if model else
+            Motor(MotorConnection(bench.port, 4_000_000, latency=usual_latency(RATE), supervisor=supervisor))
         )  # fmt: skip
+        sensor = SensorConnection("127.0.0.1", bench.ft_port, bench.page_port, 0.01)
+        self.device = MotorNetft(motor, sensor, limits, STIFFNESS)
         self.guarded = GuardedDevice(self.device, limits, RATE)
         self.guarded.open()
         self.guarded.enable()

@@ -28,33 +28,35 @@ LATE = 0.3
 
 def timing(
     folder: Path, *, rate: tuple[float, ...] = (280.0, 1000.0), priority: tuple[int, ...] = (0, 80),
-    seconds: float = 30.0,
+    seconds: float = 30.0, can: str = "",
 ) -> list[Row]:  # fmt: skip
-    """Measure each rate with each priority."""
+    """Measure each rate with each priority. can: with this drive on CAN, in place of a Dynamixel."""
     own_domain()
     rows: list[Row] = []
     for hz in rate:
         for fifo in filter(may_have, priority):
             place = folder / f"{hz:g}_{fifo}"
             place.mkdir()
-            rows += _at(hz, seconds, fifo, place)
+            rows += _at(hz, seconds, fifo, place, can)
     return rows
 
 
-def _at(rate: float, seconds: float, priority: int, folder: Path) -> list[Row]:
+def _at(rate: float, seconds: float, priority: int, folder: Path, can: str) -> list[Row]:
     patient = {"lost_cycles": 100, "ft_timeout": 1.0, "command_timeout": 10.0}
     patient |= {"autostart": True, "resume": True}
-    with RemoteBench(folder / "tty") as bench, hurried_wire(priority and priority - 1):
+    drive = ("--can", can) if can else ()
+    with RemoteBench(folder / "tty", *drive) as bench, hurried_wire(priority and priority - 1):
         if priority:
             bench.hurry(priority + 1)
-        patient |= {"rate": rate, "baud": 4_000_000, "realtime_priority": priority, **bench.parameters()}
+        baud = 1_000_000 if can else 4_000_000
+        patient |= {"rate": rate, "baud": baud, "realtime_priority": priority, **bench.parameters()}
         with run_node("driver/node", folder=folder, **patient) as node:
             topics = {"joint_states": (JointState, MEASUREMENT)}
             delays, alone, cpu = beside_bare_loop(node.pid, topics, rate, seconds, folder, priority)
         times = np.load(folder / "driver-node.npy")
         times = times[(times[:, 1] > alone[0, 1]) & (times[:, 1] < alone[-1, 1])]
         alone_for = min(0.5 * seconds, 60.0)
-        floor = _wire_alone(rate, alone_for, priority, folder, bench)
+        floor = "not on CAN" if can else _wire_alone(rate, alone_for, priority, folder, bench)
     setup = f"{rate:g} Hz, {seconds:g} s" + (f", FIFO {priority}" if priority else "")
     return [
         *_cycles(setup, rate, times[:, :2], alone),

@@ -16,6 +16,7 @@ from rsea_ros.cli._processes import parameters_of_bench
 from rsea_ros.cli._terminal import whole_number
 from rsea_ros.cli._topics import RIG
 from rsea_ros.errors import ParameterError
+from rsea_ros.hardware.peer.can_drive import DRIVES, EmulatedCan, EmulatedDrive
 from rsea_ros.hardware.peer.ft import ForceSensor, Misbehaviour
 from rsea_ros.hardware.peer.peer_motor import IDENTITY, KEPT, EmulatedEncoder, EmulatedMotor
 from rsea_ros.hardware.peer.registers import ENCODER, MODELS
@@ -37,6 +38,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--port", type=path, default=Path("rsea-bench-tty"), help="name of the link to the pseudo-terminal")
     add("--model", type=int, nargs="+", default=[54024], choices=sorted(MODELS), metavar="NUMBER",
         help="number of the motor; several form a line with the IDs 1, 2, …, the sensor on the first")
+    add("--can", nargs="+", default=[], choices=sorted(DRIVES), metavar="MODEL",
+        help="drives on a CAN bus behind a serial-line adapter in place of the motors of --model")
     add("--rig", default=RIG, help="rig of the plant: a name in config/rigs, or a file")
     add("--ft-rate", type=float, default=1000.0, help="record rate of the F/T sensor, Hz, 1 to 7000")
     add("--deflection", action="store_true",
@@ -58,9 +61,12 @@ def run(args: argparse.Namespace) -> int:
     wrong = Misbehaviour(seed=args.seed)
     kept = KEPT if args.requests else 0  # nobody else can ask for the logs
     plants, motors = _motors(args, kept)
+    if args.deflection and args.can:
+        raise ParameterError("--deflection with --can, expected one of them: no drive reads an encoder")
     if args.deflection:
         motors.append(EmulatedEncoder(plants[0]))
-    bus, sensor = EmulatedBus(args.port, motors, wrong, kept), ForceSensor(plants[0], args.ft_rate, wrong)
+    bus = (EmulatedCan if args.can else EmulatedBus)(args.port, motors, wrong, kept)
+    sensor = ForceSensor(plants[0], args.ft_rate, wrong)
     stop, stopping = os.pipe()
     inlet = sys.stdin.fileno() if args.requests else stop
     requests = LineRequests(motors, bus, sensor, wrong, inlet, sys.stdout.fileno())
@@ -83,17 +89,21 @@ def run(args: argparse.Namespace) -> int:
 def _place(args: argparse.Namespace, sensor: ForceSensor) -> dict[str, object]:
     """Return where the bench is, and the command that starts the driver on it."""
     encoder: dict[str, object] = {}
+    if args.can:
+        encoder = {"device": "mit_can", "can_interface": "slcan", "can_model": args.can[0]}
     felt = f"ft_host:=127.0.0.1 ft_port:={sensor.port} ft_page_port:={sensor.page}"
     if args.deflection:
         encoder = {"encoder_id": IDENTITY, "encoder_pulses": float(ENCODER.counts_per_turn)}
         felt = " ".join(["ft_host:=\"''\"", *(f"{name}:={value}" for name, value in encoder.items())])
+    if args.can:
+        felt = " ".join([*(f"{name}:={value}" for name, value in encoder.items()), felt])
     launch = (
         f"rsea launch hardware rig:={quote(args.rig)} port:={quote(str(args.port))} {felt} "
         f"params:={quote(str(parameters_of_bench()))} identify:=false"
     )
     return {
-        "port": str(args.port), "model": args.model[0], "ft_port": sensor.port, "page_port": sensor.page,
-        "launch": launch, **encoder,
+        "port": str(args.port), "model": (args.can or args.model)[0], "ft_port": sensor.port,
+        "page_port": sensor.page, "launch": launch, **encoder,
     }  # fmt: skip
 
 
@@ -108,9 +118,12 @@ def _motors(args: argparse.Namespace, kept: int) -> tuple[list[SimulatedDevice],
     rig = replace(rig, sensors={"deflection": Sensor(), **rig.sensors}) if args.deflection else rig
     plants: list[SimulatedDevice] = []
     motors: list[EmulatedMotor] = []
-    for place, model in enumerate(args.model):
+    for place, model in enumerate(args.can or args.model):
         plant = SimulatedDevice(rig, PLANT_RATE, seed=args.seed + place, clock=time.monotonic_ns)
-        motor = EmulatedMotor(model, plant, args.torque_constant, kept=kept)
+        motor = (
+            EmulatedDrive(model, plant, kept) if args.can
+            else EmulatedMotor(model, plant, args.torque_constant, kept=kept)
+        )  # fmt: skip
         motor.put("id", place + 1)
         motor.put("return_delay", args.return_delay)
         plant.open()

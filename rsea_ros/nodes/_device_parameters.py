@@ -8,17 +8,20 @@ from rsea_ros.hardware.device import Device
 from rsea_ros.hardware.dynamixel.encoder import LINK, SPRING
 from rsea_ros.hardware.dynamixel.line import Line
 from rsea_ros.model.rig_limits import POWER, SLEW
-from rsea_ros.nodes._devices import DYNAMIXEL, Values, device_of, dynamixel_netft, latency_of
+from rsea_ros.nodes._devices import CAN, DYNAMIXEL, Values, device_of, dynamixel_netft, latency_of
 from rsea_ros.nodes._parameters import AXIS, DERIVED, NodeParameter
 
 MOTOR = (
-    NodeParameter("port", "/dev/ttyUSB0", "serial port of the motor"),
-    NodeParameter("baud", 1_000_000, "of the serial port, as the motor is set", "bit/s", 9600, 10_500_000),
+    NodeParameter("port", "/dev/ttyUSB0", "serial port of the motor, or CAN channel, such as can0"),
+    NodeParameter("baud", 1_000_000, "of port or CAN bus, as the motor is set", "bit/s", 9600, 10_500_000),
     NodeParameter("fast_sync", False, "whether several motors on a port answer in one packet"),
     NodeParameter("id", 1, "of the motor on its bus", "", 0, 252),
     NodeParameter(
         "model", 0, "number that the motor must have (docs/hardware.md); 0: any that is known", "", 0, 65535
     ),
+    NodeParameter("can_model", "", "of the drive of mit_can (docs/devices.md), or a YAML file of its ranges"),
+    NodeParameter("can_interface", "socketcan", "of python-can, such as socketcan, slcan, virtual"),
+    NodeParameter("can_host", -1, "identifier of the drive's replies; -1: its family's", "", -1, 2047),
     NodeParameter("torque_constant", 0.0,
                   "torque at the gear output for a current; 0: that of the model's table",
                   "N m/A", 0.0, 100.0),
@@ -114,10 +117,11 @@ def devices_of(
 
 def _lines(joints: Sequence[Values]) -> dict[str, Line]:
     """Return the line of each port that several joints share. Raises ParameterError for two that collide."""
-    motors = [values for values in joints if values["device"] == DYNAMIXEL]
-    for values in motors:
-        for other in motors[: motors.index(values)]:
+    on_buses = [values for values in joints if values["device"] in (DYNAMIXEL, CAN)]
+    for values in on_buses:
+        for other in on_buses[: on_buses.index(values)]:
             _check_apart(values, other)
+    motors = [values for values in on_buses if values["device"] == DYNAMIXEL]
     ports = [values["port"] for values in motors]
     return {
         values["port"]: Line(values["port"], values["baud"], latency_of(values), fast=values["fast_sync"])
@@ -135,7 +139,7 @@ def _check_apart(values: Values, other: Values) -> None:
             f"parameter {joint}.ft_host = {values['ft_host']}, expected another than {other_joint}'s: a"
             " sensor has one client (empty: there is none)"
         )
-    if values["port"] != other["port"]:
+    if values["port"] != other["port"] or values["device"] != other["device"]:
         return
     for name in ("id", "encoder_id"):
         if values[name] >= 0 and values[name] in (other["id"], other["encoder_id"]):

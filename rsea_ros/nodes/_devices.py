@@ -6,14 +6,16 @@ from typing import Any
 
 from msg_adapters.topic_map import sign_and_index
 from rsea_ros.errors import ParameterError, RseaError
+from rsea_ros.hardware.bus_motor import BusMotor
 from rsea_ros.hardware.device import Device, Spring
 from rsea_ros.hardware.dynamixel.control_tables import MotorConnection, usual_latency
-from rsea_ros.hardware.dynamixel.encoder import EncoderConnection
+from rsea_ros.hardware.dynamixel.encoder import BusEncoder, EncoderConnection
 from rsea_ros.hardware.dynamixel.line import Line, LineMotor
 from rsea_ros.hardware.dynamixel.motor import Motor
 from rsea_ros.hardware.dynamixel.port import BAUD_RATES
-from rsea_ros.hardware.dynamixel_netft import DynamixelNetft
 from rsea_ros.hardware.limits import UNRATED, Limits, Rating
+from rsea_ros.hardware.mit_can.motor import CanConnection, MitMotor
+from rsea_ros.hardware.motor_netft import MotorNetft
 from rsea_ros.hardware.netft.sensor import SensorConnection
 from rsea_ros.hardware.outside import outside_device
 from rsea_ros.hardware.witnesses import Actuator, Witnesses
@@ -160,7 +162,8 @@ def _inapplicable(values: Values, rig: Rig) -> dict[str, str]:
     if values["device"] not in DEVICES:
         why = f"device {values['device']} does not measure it"
     deflects = _deflects(values, rig) and not rig.rigid_spring
-    return {
+    untold = dict.fromkeys(("current", "voltage"), "its frames tell none") if values["device"] == CAN else {}
+    return untold | {
         name: why for name, applicable in (("deflection", feels or deflects), ("ft", feels)) if not applicable
     }
 
@@ -173,22 +176,39 @@ def _simulated_device(values: Values) -> Device:
 
 def dynamixel_netft(values: Values, line: Line | None = None) -> Device:
     """Return motor and sensor, not open. line: of a motor that shares its port. Raises ParameterError."""
-    rig = load_rig(values["rig"])
     if values["baud"] not in BAUD_RATES:
         known = ", ".join(map(str, BAUD_RATES))
         raise ParameterError(f"parameter baud = {values['baud']} bit/s, expected one of {known}")
     alike = ("baud", "model", "torque_constant", "watchdog", "supervisor")
     own = {name: values[name] for name in alike}
     motor = MotorConnection(values["port"], identity=values["id"], latency=latency_of(values), **own)
+    made, encoder = Motor(motor) if line is None else LineMotor(motor, line), _encoder(values)
+    return _with_sensor(values, made, BusEncoder(encoder, made.port) if encoder is not None else None)
+
+
+def mit_can(values: Values) -> Device:
+    """Return a drive on a CAN bus and the sensor, not open. Raises ParameterError."""
+    if values["encoder_id"] >= 0:
+        raise ParameterError(
+            f"parameter encoder_id = {values['encoder_id']}, expected -1: {CAN} reads no encoder"
+        )
+    own = {name: values[name] for name in ("baud", "watchdog", "supervisor")}
+    latency = float(values["latency"] or usual_latency(values["rate"], 1))
+    names = {name: values[f"can_{name}"] for name in ("model", "interface", "host")}
+    drive = CanConnection(values["port"], identity=values["id"], latency=latency, **names, **own)
+    return _with_sensor(values, MitMotor(drive))
+
+
+def _with_sensor(values: Values, motor: BusMotor, encoder: BusEncoder | None = None) -> Device:
+    rig = load_rig(values["rig"])
     sensor = SensorConnection(*(values[f"ft_{name}"] for name in ("host", "port", "page_port", "timeout")))
-    stiffness = math.inf if rig.rigid_spring else rig["spring.stiffness"]
-    return DynamixelNetft(
-        Motor(motor) if line is None else LineMotor(motor, line),
+    return MotorNetft(
+        motor,
         sensor if values["ft_host"] else None,
         limits_of(values),
-        stiffness,
+        math.inf if rig.rigid_spring else rig["spring.stiffness"],
         absolute=values["position_zero"] == "motor",
-        encoder=_encoder(values),
+        encoder=encoder,
     )
 
 
@@ -211,8 +231,9 @@ def latency_of(values: Values) -> float:
     return float(values["latency"] or usual_latency(values["rate"], replies))
 
 
-DYNAMIXEL = "dynamixel_netft"
+DYNAMIXEL, CAN = "dynamixel_netft", "mit_can"
 DEVICES: Mapping[str, Callable[[Values], Device]] = {
     "simulated": _simulated_device,
     DYNAMIXEL: dynamixel_netft,
+    CAN: mit_can,
 }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from contextlib import suppress
 from functools import partial
@@ -11,9 +12,10 @@ import pytest
 from rsea_ros.hardware.device import NoReply
 from rsea_ros.hardware.dynamixel.control_tables import MotorConnection
 from rsea_ros.hardware.dynamixel.motor import Motor
-from rsea_ros.hardware.dynamixel_netft import DynamixelNetft
 from rsea_ros.hardware.guarded import GuardedDevice
 from rsea_ros.hardware.limits import Limits
+from rsea_ros.hardware.mit_can.motor import CanConnection, MitMotor
+from rsea_ros.hardware.motor_netft import MotorNetft
 from rsea_ros.hardware.netft.sensor import SensorConnection
 
 PERIOD = 1.0 / 280.0
@@ -23,10 +25,21 @@ LATENCY, FT_TIMEOUT, WATCHDOG = 0.03, 0.2, 0.5
 
 
 def device_on(bench, limits=None, *, absolute=False, **motor):
-    """Return the driver's device on a bench."""
-    settings = MotorConnection(bench.port, 4_000_000, **{"latency": LATENCY, "watchdog": WATCHDOG, **motor})
+    """Return the driver's device on a bench; a model that is a name is a drive on a CAN bus."""
+    patient, model = {"latency": LATENCY, "watchdog": WATCHDOG, **motor}, getattr(bench, "model", 54024)
+    if isinstance(model, str):
+        made = MitMotor(CanConnection(bench.port, model, interface="slcan", **patient))
+    else:
+        made = Motor(MotorConnection(bench.port, 4_000_000, **patient))
     sensor = SensorConnection("127.0.0.1", bench.ft_port, bench.page_port, FT_TIMEOUT)
-    return DynamixelNetft(Motor(settings), sensor, limits or Limits(68.0), STIFFNESS, absolute=absolute)
+    return MotorNetft(made, sensor, limits or limits_on(bench), STIFFNESS, absolute=absolute)
+
+
+def limits_on(bench):
+    """Return limits of a motor; no drive on CAN of the test makes 68 N m, nor knows each its temperature."""
+    if not isinstance(model := getattr(bench, "model", 54024), str):
+        return Limits(68.0)
+    return Limits(11.0, temperature=math.inf if model == "mini-cheetah" else 70.0)
 
 
 class Loop:
@@ -35,7 +48,7 @@ class Loop:
     def __init__(self, bench, limits=None, **motor):
         self.bench = bench
         self.device = device_on(bench, limits, **motor)
-        self.guarded = GuardedDevice(self.device, limits or Limits(68.0), 1.0 / PERIOD)
+        self.guarded = GuardedDevice(self.device, limits or limits_on(bench), 1.0 / PERIOD)
         for _ in range(3):
             with suppress(NoReply):  # of a bench that stands still
                 self.guarded.open()
@@ -91,7 +104,8 @@ def benches(tmp_path_factory):
     def bench(model=54024):
         if model not in made:
             path = tmp_path_factory.mktemp("bench") / f"tty{model}"
-            made[model] = Bench(path, "--model", model)
+            made[model] = Bench(path, "--can" if isinstance(model, str) else "--model", model)
+            made[model].model = model
             made[model].volts = 120 if model in (1020, 1170) else 240
         return made[model]
 

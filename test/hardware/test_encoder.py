@@ -11,9 +11,9 @@ from rsea_ros.hardware.dynamixel.control_tables import MotorConnection, usual_la
 from rsea_ros.hardware.dynamixel.encoder import LINK, BusEncoder, EncoderConnection
 from rsea_ros.hardware.dynamixel.line import Line, LineMotor
 from rsea_ros.hardware.dynamixel.motor import Motor
-from rsea_ros.hardware.dynamixel_netft import DynamixelNetft
 from rsea_ros.hardware.guarded import GuardedDevice, cycle
 from rsea_ros.hardware.limits import Limits
+from rsea_ros.hardware.motor_netft import MotorNetft
 from rsea_ros.hardware.peer.peer_motor import IDENTITY
 from rsea_ros.hardware.peer.registers import ENCODER
 from rsea_ros.nodes import driver
@@ -108,7 +108,8 @@ def bench(tmp_path_factory):
 
 def test_a_configure_without_the_encoder_is_refused(bench):
     motor = Motor(MotorConnection(bench.port, 4_000_000, latency=LATENCY))
-    device = DynamixelNetft(motor, None, Limits(68.0), STIFFNESS, encoder=EncoderConnection(77, latency=1e-3))
+    encoder = BusEncoder(EncoderConnection(77, latency=1e-3), motor.port)
+    device = MotorNetft(motor, None, Limits(68.0), STIFFNESS, encoder=encoder)
     with pytest.raises(NoReply, match="encoder ID 77"):
         device.open()
     assert bench.torque() == (0, False)
@@ -123,7 +124,8 @@ def test_it_is_read_beside_several_motors_of_a_line(tmp_path):
         for identity, felt in ((1, settings), (2, None)):
             given = MotorConnection(bench.port, 4_000_000, identity, latency=LATENCY, watchdog=WATCHDOG)
             motor = LineMotor(given, line)
-            device = DynamixelNetft(motor, None, small, math.inf, encoder=felt)
+            encoder = BusEncoder(felt, motor.port) if felt else None
+            device = MotorNetft(motor, None, small, math.inf, encoder=encoder)
             members.append(GuardedDevice(device, small, 1.0 / PERIOD, Spring(STIFFNESS)))
         for member in members:
             member.open()

@@ -11,9 +11,9 @@ from rsea_ros.errors import DeviceError
 from rsea_ros.hardware.device import NoReply
 from rsea_ros.hardware.dynamixel.control_tables import MotorConnection
 from rsea_ros.hardware.dynamixel.line import Line, LineMotor
-from rsea_ros.hardware.dynamixel_netft import DynamixelNetft
 from rsea_ros.hardware.guarded import GuardedDevice, cycle
 from rsea_ros.hardware.limits import Limits
+from rsea_ros.hardware.motor_netft import MotorNetft
 from rsea_ros.hardware.netft.sensor import SensorConnection
 from test.hardware.conftest import FT_TIMEOUT, LATENCY, PERIOD, WATCHDOG
 from test.nodes.stalls import until
@@ -74,7 +74,7 @@ class Three:
 
 def _device(bench, line, identity, sensor=None):
     settings = MotorConnection(bench.port, 4_000_000, identity, latency=LATENCY, watchdog=WATCHDOG)
-    return DynamixelNetft(LineMotor(settings, line), sensor, SMALL, math.inf)
+    return MotorNetft(LineMotor(settings, line), sensor, SMALL, math.inf)
 
 
 @pytest.fixture(scope="module")

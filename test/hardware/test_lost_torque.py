@@ -25,7 +25,7 @@ SECOND = 280
 
 @pytest.mark.parametrize(
     ("loop", "register"),
-    [(54024, "torque_enable"), (54025, "watchdog")],
+    [(54024, "torque_enable"), (54025, "watchdog"), ("DM8009", "torque_enable"), ("RS03", "torque_enable")],
     indirect=["loop"],
 )
 def test_registers_that_the_torque_depends_on_are_read_once_a_second(loop, register):
@@ -38,6 +38,7 @@ def test_registers_that_the_torque_depends_on_are_read_once_a_second(loop, regis
     assert loop.guarded.fault is None and loop.bench.torque()[1]
 
 
+@pytest.mark.parametrize("loop", (54024, "DM8009", "RS03", "AK10-9"), indirect=True)
 def test_a_motor_behind_an_adapter_that_is_back_is_switched_off_before_anybody_clears(loop):
     """It went on with its last goal, also after a stop and a deactivation that were answered with success."""
     loop.cycles(20, 8.0)
@@ -55,6 +56,7 @@ def test_a_motor_behind_an_adapter_that_is_back_is_switched_off_before_anybody_c
     assert loop.cycles(3, 8.0) == [8.0] * 3
 
 
+@pytest.mark.parametrize("loop", (54024, "DM8009", "RS03", "AK10-9"), indirect=True)
 def test_a_motor_absent_at_one_clear_fault_can_be_cleared_at_the_next(loop):
     """After an emergency stop the port was opened again but the motor not set up: 'not open' for ever."""
     loop.bench.ask("misbehave", silent=True)
@@ -88,6 +90,7 @@ sys.path.insert(0, "test/hardware")
 from conftest import Loop
 class Bench:
     port, ft_port, page_port = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
+    model = int(sys.argv[5]) if sys.argv[5].isdigit() else sys.argv[5]
 loop = Loop(Bench, supervisor=sys.argv[4])
 loop.guarded.enable()
 while True:
@@ -95,11 +98,12 @@ while True:
 """
 
 
-def test_a_supervisor_service_zeroes_the_torque_when_a_whole_process_group_is_killed(benches, service):
+@pytest.mark.parametrize("model", (54024, "AK10-9", "CyberGear"))
+def test_a_supervisor_service_zeroes_the_torque_when_a_whole_process_group_is_killed(benches, service, model):
     """Driver, its children and its session are killed at once, as by a service manager or a container."""
-    bench, root = benches(), Path(__file__).resolve().parents[2]
+    bench, root = benches(model), Path(__file__).resolve().parents[2]
     well_behaved(bench)
-    words = [sys.executable, "-c", DRIVER, bench.port, bench.ft_port, bench.page_port, service]
+    words = [sys.executable, "-c", DRIVER, bench.port, bench.ft_port, bench.page_port, service, model]
     driver = subprocess.Popen(list(map(str, words)), cwd=root, start_new_session=True)
     try:
         until(lambda: bench.torque()[0] != 0 and bench.torque()[1])
@@ -114,7 +118,7 @@ def test_the_drivers_own_supervisor_outlives_a_login_that_is_killed(benches):
     bench, root = benches(), Path(__file__).resolve().parents[2]
     well_behaved(bench)
     near, far = pty.openpty()
-    words = [sys.executable, "-c", DRIVER, bench.port, bench.ft_port, bench.page_port, ""]
+    words = [sys.executable, "-c", DRIVER, bench.port, bench.ft_port, bench.page_port, "", 54024]
     login = subprocess.Popen(
         list(map(str, words)), cwd=root, start_new_session=True, stdin=far, stdout=far, stderr=far,
         preexec_fn=lambda: fcntl.ioctl(0, termios.TIOCSCTTY, 0),

@@ -14,7 +14,8 @@ from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.rig_limits import check_travel
 from rsea_ros.nodes import _control, _devices, driver
-from rsea_ros.nodes._devices import limits_of
+from rsea_ros.nodes._device_parameters import devices_of
+from rsea_ros.nodes._devices import DEVICES, limits_of
 
 DEFAULTS = {parameter.name: parameter.default for parameter in driver.TABLE}
 
@@ -79,6 +80,22 @@ def test_a_limit_that_cannot_be_applied_or_reached_is_refused(values, told):
     """Milliradians and degrees of a limit were accepted: it limited nothing."""
     with pytest.raises(ParameterError, match=told):
         limits(**values)
+
+
+def test_a_drive_on_can_has_no_limit_of_what_its_frames_do_not_tell():
+    drive = {"device": "mit_can", "can_model": "AK80-9", "port": "can0", "joint": "hip"}
+    made = limits(**drive)
+    assert (made.current, made.voltage, made.temperature) == (math.inf, 0.0, 70.0)
+    assert "current_limit none (its frames tell none)" in str(made)
+    with pytest.raises(ParameterError, match=r"current_limit = 5 cannot be applied .*its frames tell none"):
+        limits(**drive, current_limit=5.0)
+    with pytest.raises(ParameterError, match=r"encoder_id = 3, expected -1: mit_can reads no encoder"):
+        devices_of([DEFAULTS | drive | {"encoder_id": 3}], DEVICES)
+    two = [DEFAULTS | drive | {"ft_host": "", **more} for more in ({}, {"joint": "knee"})]
+    with pytest.raises(ParameterError, match=r"knee\.id = 1, expected another than hip's"):
+        devices_of(two, DEVICES)
+    devices, lines = devices_of([two[0], two[1] | {"id": 2}], DEVICES)
+    assert len(devices) == 2 and lines == []
 
 
 @pytest.mark.parametrize("value", [10_000.0, 180.0])

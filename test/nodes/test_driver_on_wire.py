@@ -24,7 +24,8 @@ def bench(tmp_path_factory):
 
     def place(model):
         if model not in made:
-            made[model] = Bench(tmp_path_factory.mktemp("wire") / "tty", "--model", model)
+            kind = "--can" if isinstance(model, str) else "--model"
+            made[model] = Bench(tmp_path_factory.mktemp("wire") / "tty", kind, model)
         return made[model]
 
     yield place
@@ -187,11 +188,15 @@ def test_after_sigint_the_torque_is_zero_and_off(wire):
     [
         (54024, signal.SIGKILL, -signal.SIGKILL, (0, False)),
         (54025, signal.SIGKILL, -signal.SIGKILL, (0, True)),
+        ("RS03", signal.SIGKILL, -signal.SIGKILL, (0, False)),
+        ("AK10-9", signal.SIGKILL, -signal.SIGKILL, (0, False)),
+        ("DM8009", signal.SIGINT, 0, (0, False)),
     ],
 )
 def test_after_a_kill_the_torque_is_zero_on_the_wire(bench, start, listener, model, number, status, end):
-    """By the supervisor; by the motor's own watchdog, which leaves it on at zero."""
-    victim = Driven(bench(model), listener, f"{number.name}_{model}".lower(), start)
+    """By the supervisor; by the motor's own watchdog, which leaves a Dynamixel on at zero."""
+    name = f"{number.name}_{model}".lower().replace("-", "_")
+    victim = Driven(bench(model), listener, name, start)
     victim.drive()
     assert victim.process.stop(number) == status
     listener.until(lambda: victim.goal() == end)

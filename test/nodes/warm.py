@@ -27,7 +27,7 @@ from rsea_ros.hardware.peer.remote import RemoteBench
 
 ROOT = Path(__file__).resolve().parents[2]
 MODULES = (
-    "rsea_ros.hardware.dynamixel_netft",
+    "rsea_ros.hardware.motor_netft",
     "rsea_ros.hardware.guarded", "rsea_ros.model.observer", "rsea_ros.model.torque_band",
     "rsea_ros.control.controller", "rsea_ros.identification.identify", "rsea_ros.health.monitor",
     "rsea_ros.experiment.campaign", "msg_adapters",

@@ -3,7 +3,6 @@
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import TypeVar
 
 from dynamixel_sdk import (
     COMM_RX_CORRUPT,
@@ -14,14 +13,14 @@ from dynamixel_sdk import (
     Protocol2PacketHandler,
 )
 
+from rsea_ros.hardware.bus_motor import T, repeat
 from rsea_ros.hardware.device import NoReply, Refused
 from rsea_ros.hardware.dynamixel import frames
 from rsea_ros.hardware.dynamixel.control_tables import Item
 from rsea_ros.hardware.dynamixel.port import SerialPort
 
-T = TypeVar("T")
-ATTEMPTS, PATIENCE = 5, 0.02
-"""Of a transaction outside the cycle: how often it is tried, and how late a reply may be each time, s."""
+PATIENCE = 0.02
+"""s by which a reply may be late outside the cycle."""
 ALERT = 0x80
 REFUSALS = {
     1: "failed", 2: "unknown instruction", 3: "CRC wrong", 5: "length wrong", 6: "value beyond its limit",
@@ -167,7 +166,7 @@ class Bus:
         """Return the result of a transaction outside the cycle, with several attempts."""
         usual, self.latency = self.latency, max(self.latency, PATIENCE)
         try:
-            return _repeat(transaction)
+            return repeat(transaction)
         finally:
             self.latency = usual
 
@@ -200,13 +199,3 @@ class Bus:
             self._failed["refused"] += 1
             why = REFUSALS.get(error & ~ALERT, f"error {error & ~ALERT}")
             raise Refused(f"{self._name}: {request} refused: {why}")
-
-
-def _repeat(transaction: Callable[[], T]) -> T:
-    """Return the result of a transaction, repeated when a reply is lost."""
-    for _ in range(ATTEMPTS - 1):
-        try:
-            return transaction()
-        except NoReply:
-            continue
-    return transaction()

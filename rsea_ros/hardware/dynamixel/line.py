@@ -10,10 +10,10 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from rsea_ros.errors import DeviceError
+from rsea_ros.hardware.bus_motor import MotorSample
 from rsea_ros.hardware.device import NoReply, PortLost
 from rsea_ros.hardware.dynamixel.bus import ALERT
 from rsea_ros.hardware.dynamixel.control_tables import ControlTable, MotorConnection
-from rsea_ros.hardware.dynamixel.encoder import MotorSample
 from rsea_ros.hardware.dynamixel.frames import BROADCAST, StatusFrameParser, frame
 from rsea_ros.hardware.dynamixel.motor import Motor
 from rsea_ros.hardware.dynamixel.port import SerialPort

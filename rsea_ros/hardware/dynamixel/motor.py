@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict
 
 from rsea_ros.errors import DeviceError, ParameterError
+from rsea_ros.hardware.bus_motor import BusMotor, MotorSample, T, Unwrapper
 from rsea_ros.hardware.device import NoReply, PortLost
 from rsea_ros.hardware.dynamixel.bus import ALERT, Bus
 from rsea_ros.hardware.dynamixel.control_tables import (
@@ -15,41 +16,38 @@ from rsea_ros.hardware.dynamixel.control_tables import (
     TorqueConstant,
     error_names,
 )
-from rsea_ros.hardware.dynamixel.encoder import MotorSample, sample_of
 from rsea_ros.hardware.dynamixel.frames import frame
-from rsea_ros.hardware.dynamixel.own_limits import OwnLimits, Watchlist, own_limits
+from rsea_ros.hardware.dynamixel.own_limits import OwnLimits, Watchlist, check_own_limits, own_limits
 from rsea_ros.hardware.dynamixel.port import SerialPort
+from rsea_ros.hardware.limits import Limits, Rating
 from rsea_ros.hardware.protection import BUS_WATCHDOG, Protection, Supervised
 
 TORQUE_MODE, ACKNOWLEDGE_ALL = 0, 2
 RETURN_DELAY_UNIT = 2e-6
 WATCHDOG_UNIT = 0.02
 WRITE, STATUS = 0x03, 0x55
-BOOT_TIME, BOOT_POLL = 5.0, 0.02
 WHILE_OFF = 0.1
 """s after which it is looked at again whether a motor is still off."""
-AS_CONFIGURED = "as it was at configure (another one needs cleanup and configure)"
 
 
-class Motor:
+class Motor(BusMotor):
     """One motor on a port, of its own unless one is given, which is then opened and closed by its owner.
 
-    protection: the motor's bus watchdog, or a supervisor for a motor without; known once it is open.
-    torque_constant: N m/A of the counts, with its spread; own: the motor's settings.
-    acknowledged_late: whether the reply to a write that raised NoReply arrived during the last reading.
+    torque_constant: N m/A of the counts, with its spread; limits: the motor's settings.
     """
 
     def __init__(self, settings: MotorConnection, port: SerialPort | None = None) -> None:
+        super().__init__(
+            f"motor ID {settings.identity} on {settings.path}", settings.watchdog, settings.supervisor
+        )
         self._settings, self._shared = settings, port is not None
         self.port = port or SerialPort(settings.path, settings.baud, settings.latency)
         self.bus = Bus(self.port, settings.identity)
-        self.protection: Protection | Supervised = Supervised(settings.watchdog, settings.supervisor)
         self._watchlist = Watchlist(self.bus)
         self._longer, self._spared = 0, 0.0
-        self.acknowledged_late, self._unanswered = False, -1
+        self._unanswered, self._counts = -1, Unwrapper()
         self.table: ControlTable | None = None
         self.limits: OwnLimits | None = None
-        self._known: Mapping[str, object] | None = None
         self.torque_constant = TorqueConstant(math.nan, math.nan, math.nan, "")
 
     @property
@@ -60,17 +58,25 @@ class Motor:
         return self.table
 
     @property
-    def torque_limit(self) -> float:
-        """The torque at the motor's own current limit, N m."""
-        return math.nan if self.limits is None else self.torque_of(self.limits.current)
+    def rating(self) -> Rating:
+        """Torque and current at the motor's own limit, its speed without load, the range of its supply."""
+        own = self.limits
+        if own is None:
+            return Rating(math.nan)
+        speed, supply = self.control_table.no_load_speed, (own.lowest_voltage, own.highest_voltage)
+        return Rating(self.torque_of(own.current), speed, math.inf, own.current, *supply)
+
+    def check(self, limits: Limits) -> None:
+        """Compare the driver's limits with the motor's. Raises ParameterError."""
+        assert self.limits is not None
+        check_own_limits(limits, self.limits, self.control_table.name)
 
     def open(self) -> None:
-        """Open the port, check who answers, switch the torque off, set torque mode, read the limits."""
-        self._known = None
-        self._set_up()
+        """Open it; its position counts anew."""
+        self._counts.restart()
+        super().open()
 
     def _set_up(self) -> None:
-        """Do the work of `open`, also for a motor that was lost: it must be the same one then."""
         if not self._shared:
             self.port.open()
         self.table = table = _table(self._model(), self._settings)
@@ -103,14 +109,6 @@ class Motor:
         self._check_same({"model": model})
         return model
 
-    def _check_same(self, found: Mapping[str, object]) -> None:
-        """Raise DeviceError where something is not as at `open`."""
-        known = self._known or found
-        if changed := [name for name in found if found[name] != known[name]]:
-            words = "; ".join(f"{name} {found[name]}, expected {known[name]}" for name in changed)
-            where = f"motor ID {self._settings.identity} on {self._settings.path}"
-            raise DeviceError(f"{where}: {words}, {AS_CONFIGURED}")
-
     def _protection(self, table: ControlTable, limits: OwnLimits) -> Protection | Supervised:
         """Return the motor's own watchdog where model and firmware have one, else a supervisor."""
         if "bus_watchdog" in table.items and limits.firmware >= table.watchdog_firmware:
@@ -136,11 +134,6 @@ class Motor:
             kept.append(("bus_watchdog", table.bus_watchdog, armed))
         self.bus.set(table.torque_enable, 1)
         self._watchlist.expect(*kept)
-
-    def disable(self) -> None:
-        """Command zero torque and switch it off."""
-        if self.table is not None:
-            self._stop()
 
     def read(self, meanwhile: Callable[[], None] | None = None) -> MotorSample:
         """Read all measurements once. Raises NoReply, PortLost, Refused.
@@ -170,7 +163,20 @@ class Motor:
         """Return the reading with the motor's errors; watched registers are checked here in turn."""
         table = self.control_table
         error = error_names(self.bus.get(table.hardware_error)) if self.bus.alert else ""
-        return sample_of(table, data, instant, error, "" if error else self._watchlist.look())
+        trouble, start = "" if error else self._watchlist.look(), table.sample[0]
+        counts = self._counts.take(table.position.value(data, start))
+        current = table.current.value(data, start) * table.ampere
+        return MotorSample(
+            instant=instant,
+            position=counts * 2.0 * math.pi / table.pulses,
+            velocity=table.velocity.value(data, start) * table.radian_per_second,
+            torque=self.torque_of(current),
+            current=current,
+            voltage=table.voltage.value(data, start) * 0.1,
+            temperature=float(table.temperature.value(data, start)),
+            hardware_error=error,
+            trouble=trouble,
+        )
 
     def write(self, torque: float) -> None:
         """Command a torque (N m). Raises NoReply, PortLost, Refused."""
@@ -189,55 +195,44 @@ class Motor:
         """Return the torque (N m) of a current (A)."""
         return current * self.torque_constant.value
 
-    def recover(self) -> None:
-        """Open the port again if it is lost, and see that it is the same motor, torque off.
+    def patiently(self, transaction: Callable[[], T]) -> T:
+        """Return the result of a transaction outside the cycle, with several attempts and more time."""
+        return self.bus.patiently(transaction)
 
-        Raises DeviceError, also while the motor reports a hardware error.
-        """
-        try:
-            self.control_table  # noqa: B018  a motor that was away when the port was opened again is not set up
-            self.bus.patiently(self.bus.ping)
-        except DeviceError:
-            self.close()
-            self._set_up()
-        else:
-            self._identify()
-        self._supervise()
+    def health(self) -> Mapping[str, object]:
+        """Return errors of the bus by kind, and the motor's settings."""
+        values: dict[str, object] = {f"bus_{kind}": n for kind, n in self.bus.errors.items()}
+        if self.table is not None and self.limits is not None:
+            values |= {
+                "motor": self.table.name,
+                "firmware": self.limits.firmware,
+                "torque_limit_nm": f"{self.torque_limit:.4g}",
+                "torque_constant": self.torque_constant,
+                "homing_offset_rad": f"{self.limits.homing_offset:.6g}",
+                "reversed": self.limits.reversed,
+            }
+        return values
+
+    def _is_set_up(self) -> bool:
+        return self.table is not None
+
+    def _ping(self) -> None:
+        self.bus.ping()
+
+    def _answer(self) -> None:
+        self.bus.patiently(self.bus.ping)
+
+    def _complaint(self) -> str:
         error = self.bus.patiently(lambda: self.bus.get(self.control_table.hardware_error))
-        if error:
-            raise DeviceError(f"motor: hardware error {error_names(error)}, expected a reboot first")
+        return error_names(error) if error else ""
 
-    def reboot(self) -> None:
-        """Reboot the motor and set it up again. Raises DeviceError when it does not come back."""
-        self.disable()
+    def _restart(self) -> None:
         self.bus.patiently(self.bus.reboot)
-        deadline = time.monotonic() + BOOT_TIME
-        while True:
-            time.sleep(BOOT_POLL)
-            try:
-                self.bus.ping()
-                break
-            except NoReply:
-                if time.monotonic() > deadline:
-                    raise
-        self.close()
-        self._set_up()
 
-    def close(self) -> None:
-        """Zero torque, off, port closed; where the motor does not acknowledge it, the supervisor stays."""
-        safe = False
-        try:
-            if self.table is not None:
-                self._stop()
-                safe = True
-        except DeviceError:
-            safe = False  # the supervisor's turn
-        finally:
-            if isinstance(self.protection, Supervised):
-                self.protection.release(safe=safe)
-            self.table = None
-            if not self._shared:
-                self.port.close()
+    def _end(self) -> None:
+        self.table = None
+        if not self._shared:
+            self.port.close()
 
     def _stop(self) -> None:
         """Switch the torque off, then clear the watchdog: a tripped one refuses a new goal.

@@ -27,7 +27,7 @@ class RemoteBench:
         place = self._receive()
         self.port, self.ft_port, self.page_port = str(path), int(place["ft_port"]), int(place["page_port"])
         self.launch = str(place["launch"])
-        self._encoder = {name: value for name, value in place.items() if name.startswith("encoder")}
+        self._more = {n: value for n, value in place.items() if n.startswith(("encoder", "can", "device"))}
 
     def _begin(self, words: list[str]) -> subprocess.Popen[bytes]:
         return subprocess.Popen(
@@ -43,12 +43,10 @@ class RemoteBench:
 
     def parameters(self) -> dict[str, object]:
         """Return the parameters that a driver node needs to find it."""
-        if self._encoder:
-            return {"device": "dynamixel_netft", "port": self.port, "ft_host": "", **self._encoder}
-        return {
-            "device": "dynamixel_netft", "port": self.port, "ft_host": "127.0.0.1",
-            "ft_port": self.ft_port, "ft_page_port": self.page_port,
-        }  # fmt: skip
+        place = {"device": "dynamixel_netft", "port": self.port, **self._more}
+        if "encoder_id" in place:
+            return place | {"ft_host": ""}
+        return place | {"ft_host": "127.0.0.1", "ft_port": self.ft_port, "ft_page_port": self.page_port}
 
     def hurry(self, priority: int = 50) -> bool:
         """Let it answer at SCHED_FIFO, as hardware with its own processors; return whether it may."""

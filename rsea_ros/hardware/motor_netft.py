@@ -1,44 +1,42 @@
-"""A Dynamixel on its bus as a device, with an ATI Net F/T sensor, an encoder on the spring, or neither."""
+"""A motor on its bus as a device, with an ATI Net F/T sensor, an encoder on the spring, or neither."""
 
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 
+from rsea_ros.hardware.bus_motor import BusMotor
 from rsea_ros.hardware.device import State, Wrench
-from rsea_ros.hardware.dynamixel.encoder import BusEncoder, EncoderConnection, MotorSample, Unwrapper
-from rsea_ros.hardware.dynamixel.motor import Motor
-from rsea_ros.hardware.dynamixel.own_limits import check_own_limits
+from rsea_ros.hardware.dynamixel.encoder import BusEncoder
 from rsea_ros.hardware.limits import Limits, Rating, check_limits
 from rsea_ros.hardware.netft.sensor import ForceTorqueSensor, SensorConnection
 from rsea_ros.hardware.protection import Protection
 
 
-class DynamixelNetft:
+class MotorNetft:
     """Motor and sensor behind the Device interface.
 
     Angles count from where the drive stands when the device is opened: torque off, the spring at rest.
     absolute: they count from the motor's own zero instead, its encoder's with its homing offset.
-    motor: alone on its port, or a LineMotor. encoder: of the spring, on the same port.
+    motor: alone on its port, or one of several. encoder: of the spring, on the port of a Dynamixel.
     stiffness: of the rig's spring, N m/rad, which the limits are checked against.
     """
 
     def __init__(
         self,
-        motor: Motor,
+        motor: BusMotor,
         sensor: SensorConnection | None,
         limits: Limits,
         stiffness: float,
         *,
         absolute: bool = False,
-        encoder: EncoderConnection | None = None,
+        encoder: BusEncoder | None = None,
     ) -> None:
         self._motor = motor
-        self._encoder = BusEncoder(encoder, motor.port) if encoder is not None else None
+        self._encoder = encoder
         self._sensor = ForceTorqueSensor(sensor) if sensor is not None else None
         self._limits, self._stiffness, self._absolute = limits, stiffness, absolute
-        self._epoch = 0
-        self.origin, self._counts = 0.0, Unwrapper()
+        self._epoch, self.origin = 0, 0.0
         self._waiting: list[tuple[int, Wrench]] = []
         self._trouble = ""
         self._last: State | None = None
@@ -50,12 +48,10 @@ class DynamixelNetft:
 
     @property
     def rating(self) -> Rating:
-        """The motor's own limits, its speed without load, and the range of the sensor."""
-        felt = math.inf if self._sensor is None else self._sensor.range[self._limits.ft_axis]
-        own, motor = self._motor.limits, self._motor
-        assert own is not None
-        supply = own.lowest_voltage, own.highest_voltage
-        return Rating(motor.torque_limit, motor.control_table.no_load_speed, felt, own.current, *supply)
+        """The motor's own limits, and the range of the sensor."""
+        if self._sensor is None:
+            return self._motor.rating
+        return replace(self._motor.rating, ft=self._sensor.range[self._limits.ft_axis])
 
     def open(self) -> None:
         """Connect to both and check the limits. Raises DeviceError, ParameterError; nothing stays open."""
@@ -63,10 +59,8 @@ class DynamixelNetft:
         try:
             self._motor.open()
             check_limits(self._limits, self._motor.torque_limit, self._stiffness)
-            assert self._motor.limits is not None
-            check_own_limits(self._limits, self._motor.limits, self._motor.control_table.name)
-            self._counts.restart()
-            sample = self._motor.bus.patiently(self._read_motor)
+            self._motor.check(self._limits)
+            sample = self._motor.patiently(self._motor.read)
             self.origin = 0.0 if self._absolute else sample.position
             if self._encoder is not None:
                 self._encoder.open(sample, absolute=self._absolute)
@@ -86,7 +80,7 @@ class DynamixelNetft:
         The sensor's socket is emptied while the motor answers, and of the rest after that.
         """
         try:
-            sample = self._read_motor(self._sensor.gather if self._sensor is not None else None)
+            sample = self._motor.read(self._sensor.gather if self._sensor is not None else None)
             deflection = math.nan if self._encoder is None else self._encoder.deflection(sample)
         finally:
             self._take_wrenches()
@@ -96,7 +90,7 @@ class DynamixelNetft:
             stamp=sample.instant + self._epoch,
             position=sample.position - self.origin,
             velocity=sample.velocity,
-            motor_torque=self._motor.torque_of(sample.current),
+            motor_torque=sample.torque,
             ft_stamp=stamp,
             wrench=wrench,
             wrenches=wrenches,
@@ -110,12 +104,6 @@ class DynamixelNetft:
             acknowledged_late=self._motor.acknowledged_late,
         )
         return self._last
-
-    def _read_motor(self, meanwhile: Callable[[], None] | None = None) -> MotorSample:
-        """Return a sample whose position goes on where the motor's counts wrap round."""
-        sample = self._motor.read(meanwhile)
-        turn = 2.0 * math.pi / self._motor.control_table.pulses
-        return replace(sample, position=self._counts.take(sample.counts) * turn)
 
     def _take_wrenches(self) -> None:
         """Keep the sensor's wrenches until a reading includes them, also after a lost reply."""
@@ -157,17 +145,7 @@ class DynamixelNetft:
 
     def health(self) -> Mapping[str, object]:
         """Return errors of bus and stream by kind, and the motor's last report."""
-        values: dict[str, object] = {f"bus_{kind}": n for kind, n in self._motor.bus.errors.items()}
-        limits = self._motor.limits
-        if self._motor.table is not None and limits is not None:
-            values |= {
-                "motor": self._motor.table.name,
-                "firmware": limits.firmware,
-                "torque_limit_nm": f"{self._motor.torque_limit:.4g}",
-                "torque_constant": self._motor.torque_constant,
-                "homing_offset_rad": f"{limits.homing_offset:.6g}",
-                "reversed": limits.reversed,
-            }
+        values = dict(self._motor.health())
         if self._encoder is not None:
             values |= {f"encoder_{kind}": n for kind, n in self._encoder.errors.items()}
         if self._sensor is not None:

@@ -1,0 +1,220 @@
+"""A motor on a bus: what each is asked at open, before its torque comes on, after a fault and at the end."""
+
+import math
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TypeVar
+
+from rsea_ros.errors import DeviceError
+from rsea_ros.hardware.device import NoReply
+from rsea_ros.hardware.limits import Limits, Rating
+from rsea_ros.hardware.protection import Protection, Supervised
+
+T = TypeVar("T")
+ATTEMPTS = 5
+"""Of a transaction outside the cycle."""
+BOOT_TIME, BOOT_POLL = 5.0, 0.02
+AS_CONFIGURED = "as it was at configure (another one needs cleanup and configure)"
+
+
+def repeat(transaction: Callable[[], T]) -> T:
+    """Return the result of a transaction, repeated when a reply is lost."""
+    for _ in range(ATTEMPTS - 1):
+        try:
+            return transaction()
+        except NoReply:
+            continue
+    return transaction()
+
+
+class Unwrapper:
+    """Counts of an encoder that go on where they begin anew, after `period` of them."""
+
+    def __init__(self, period: int = 1 << 32) -> None:
+        self._period = period
+        self._last: int | None = None
+
+    def restart(self) -> None:
+        """Take the next counts as they are."""
+        self._last = None
+
+    def take(self, counts: int) -> int:
+        """Return the counts nearest to the last ones, modulo the period."""
+        last, half = counts if self._last is None else self._last, self._period // 2
+        self._last = last + (counts - last + half) % self._period - half
+        return self._last
+
+
+@dataclass(frozen=True)
+class MotorSample:
+    """instant: middle of the transaction, monotonic ns. position rad, without a wrap, velocity rad/s, torque
+    N m, current A, voltage V, temperature °C; nan: not measured.
+
+    hardware_error: errors that the motor reports. trouble: wrong values of its registers, in words.
+    """
+
+    instant: int
+    position: float
+    velocity: float
+    torque: float
+    current: float = math.nan
+    voltage: float = math.nan
+    temperature: float = math.nan
+    hardware_error: str = ""
+    trouble: str = ""
+
+
+class BusMotor(ABC):
+    """One motor of some protocol. name: in messages, with its ID and port.
+
+    protection: the motor's own watchdog, or a supervisor for a motor without; known once it is open.
+    acknowledged_late: whether the reply to a write that raised NoReply arrived during the last reading.
+    """
+
+    acknowledged_late = False
+
+    def __init__(self, name: str, watchdog: float, supervisor: str) -> None:
+        self.name = name
+        self.protection: Protection | Supervised = Supervised(watchdog, supervisor)
+        self._known: Mapping[str, object] | None = None
+
+    def open(self) -> None:
+        """Open the port, check who answers, switch the torque off, set torque mode, read the limits."""
+        self._known = None
+        self._set_up()
+
+    def disable(self) -> None:
+        """Command zero torque and switch it off."""
+        if self._is_set_up():
+            self._stop()
+
+    def recover(self) -> None:
+        """Open the port again if it is lost, and see that it is the same motor, torque off.
+
+        Raises DeviceError, also while the motor reports a hardware error.
+        """
+        try:
+            if not self._is_set_up():
+                raise NoReply(f"{self.name}: it was away when the port was opened again")
+            self._answer()
+        except DeviceError:
+            self.close()
+            self._set_up()
+        else:
+            self._identify()
+        self._supervise()
+        if error := self._complaint():
+            raise DeviceError(f"motor: hardware error {error}, expected a reboot first")
+
+    def reboot(self) -> None:
+        """Reboot the motor and set it up again. Raises DeviceError when it does not come back."""
+        self.disable()
+        self._restart()
+        deadline = time.monotonic() + BOOT_TIME
+        while True:
+            time.sleep(BOOT_POLL)
+            try:
+                self._ping()
+                break
+            except NoReply:
+                if time.monotonic() > deadline:
+                    raise
+        self.close()
+        self._set_up()
+
+    def close(self) -> None:
+        """Zero torque, off, port closed; where the motor does not acknowledge it, the supervisor stays."""
+        safe = False
+        try:
+            if self._is_set_up():
+                self._stop()
+                safe = True
+        except DeviceError:
+            safe = False  # the supervisor's turn
+        finally:
+            if isinstance(self.protection, Supervised):
+                self.protection.release(safe=safe)
+            self._end()
+
+    def _check_same(self, found: Mapping[str, object]) -> None:
+        """Raise DeviceError where something is not as at `open`."""
+        known = self._known or found
+        if changed := [name for name in found if found[name] != known[name]]:
+            words = "; ".join(f"{name} {found[name]}, expected {known[name]}" for name in changed)
+            raise DeviceError(f"{self.name}: {words}, {AS_CONFIGURED}")
+
+    @property
+    @abstractmethod
+    def rating(self) -> Rating:
+        """What the motor can do at most."""
+
+    @property
+    def torque_limit(self) -> float:
+        """The motor's own, N m."""
+        return self.rating.torque
+
+    @abstractmethod
+    def check(self, limits: Limits) -> None:
+        """Compare the driver's limits with the motor's own. Raises ParameterError."""
+
+    @abstractmethod
+    def enable(self) -> None:
+        """Switch the torque on, at zero, with a watchdog. Raises DeviceError, also for another motor."""
+
+    @abstractmethod
+    def read(self, meanwhile: Callable[[], None] | None = None) -> MotorSample:
+        """Read all measurements once. Raises NoReply, PortLost. meanwhile: done while the reply is coming."""
+
+    @abstractmethod
+    def write(self, torque: float) -> None:
+        """Command a torque (N m). Raises NoReply, PortLost."""
+
+    @abstractmethod
+    def patiently(self, transaction: Callable[[], T]) -> T:
+        """Return the result of a transaction outside the cycle, with several attempts and more time."""
+
+    @abstractmethod
+    def health(self) -> Mapping[str, object]:
+        """Return errors of the bus by kind, and what describes the motor."""
+
+    @abstractmethod
+    def _set_up(self) -> None:
+        """Do the work of `open`, also for a motor that was lost: it must be the same one then."""
+
+    @abstractmethod
+    def _identify(self) -> None:
+        """Switch the torque off, compare motor and settings with those of `open`, set torque mode."""
+
+    @abstractmethod
+    def _is_set_up(self) -> bool:
+        """Return whether the port is open, and the motor known."""
+
+    @abstractmethod
+    def _stop(self) -> None:
+        """Command zero torque and switch it off. Raises DeviceError unless the motor acknowledges it."""
+
+    @abstractmethod
+    def _answer(self) -> None:
+        """Raise DeviceError where the motor does not answer, after several attempts."""
+
+    @abstractmethod
+    def _ping(self) -> None:
+        """Raise NoReply where the motor does not answer at once."""
+
+    @abstractmethod
+    def _complaint(self) -> str:
+        """Return the hardware errors of the motor, in words."""
+
+    @abstractmethod
+    def _restart(self) -> None:
+        """Let the motor restart, its errors cleared."""
+
+    @abstractmethod
+    def _supervise(self) -> None:
+        """Start a supervisor for a motor without a watchdog, and a new one for one that is dead."""
+
+    @abstractmethod
+    def _end(self) -> None:
+        """Close the port."""
