@@ -112,14 +112,15 @@ def controller_of(values: Values, designed: ControllerDesign, link: LinkShare) -
 
 
 def summary(designed: ControllerDesign) -> list[str]:
-    """Return gains and margins as lines for the log."""
-    g = designed.gains
+    """Return gains, margins and what they tolerate as lines for the log."""
+    g, tolerated = designed.gains, designed.uncertainty
+    unstated = "" if tolerated.mode else "; no mode of the F/T sensor's mount: `uncertainty` states one"
     head = (
         f"k_p {g.k_p:.3f}, k_d {1e3 * g.k_d:.2f} ms, k_i {g.k_i:.2f}, Q {g.q_frequency:.1f} Hz, "
         f"k_w {g.k_w:.1f} N·m·s/rad at {designed.rate:g} Hz; "
         f"largest sensitivity of the set {designed.sensitivity:.2f}"
     )
-    return [head] + [
+    return [head, f"tolerated: {tolerated}{unstated}"] + [
         f"{name}: crossover {m.crossover:.1f} Hz, phase margin {m.phase:.1f} deg, "
         f"gain margin {m.gain:.1f} dB, delay margin {m.delay:.2f} samples"
         for name, m in designed.margins.items()

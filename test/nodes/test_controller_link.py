@@ -15,7 +15,7 @@ from rsea_ros.model.rig import EffectSetting, Sensor
 from rsea_ros.model.rig_file import load_rig, save_rig
 from rsea_ros.model.simulation import Plant
 from rsea_ros.nodes import _link as _measurements
-from rsea_ros.nodes._control import TABLE, with_limits
+from rsea_ros.nodes._control import TABLE, summary, with_limits
 from rsea_ros.nodes._link import link_of, link_values, link_words
 
 RATE = 280.0
@@ -33,6 +33,12 @@ def bench(name="paper_high_impedance", sensors=ENCODER, effects=()):
 def values(rig, path, **given):
     save_rig(rig, path / "model.yaml")
     return with_limits({**{p.name: p.default for p in TABLE}, "rig": str(path / "model.yaml"), **given})
+
+
+def test_the_log_says_which_mode_a_design_tolerates_or_that_it_knows_none():
+    told = [" ".join(summary(replace(DESIGN, uncertainty=u))) for u in (SET, replace(SET, mode=None))]
+    assert ["33 Hz" in words for words in told] == [True, False]
+    assert ["no mode of the F/T sensor's mount: `uncertainty`" in words for words in told] == [False, True]
 
 
 def test_it_is_used_where_the_rig_has_the_sensor(tmp_path):
