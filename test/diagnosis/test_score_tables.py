@@ -100,7 +100,7 @@ def test_each_sample_is_in_training_validation_or_test():
 def test_the_largest_missed_response_of_all_records_counts(monkeypatch, shares, names, missed):
     left = iter(shares)
 
-    def coherence(run, output, channel, blocks, rule):
+    def coherence(run, output, channel, blocks):
         assert channel == "ft"
         return next(left)
 

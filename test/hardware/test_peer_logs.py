@@ -17,7 +17,7 @@ def test_a_bench_keeps_no_more_than_it_is_asked_to(tmp_path, kept, left):
     """A bench that nobody could ask grew by 3.7 MB a minute."""
     args = argparse.Namespace(
         rig="paper_high_impedance", model=[54024], seed=0, torque_constant=0.0, return_delay=0,
-        deflection=False,
+        deflection=False, can=None,
     )
     _, motors = _motors(args, kept)
     bus = EmulatedBus(tmp_path / "tty", motors, Misbehaviour(), kept)
