@@ -20,7 +20,7 @@ from msg_adapters.ros import JointState
 
 ROOT = Path(__file__).resolve().parents[1]
 EXECUTABLES = (
-    "controller", "driver", "excite", "experiment", "health", "identify", "model", "plant", "record",
+    "controller", "driver", "excite", "experiment", "health", "identify", "joint", "model", "plant", "record",
     "replay", "watch",
 )  # fmt: skip
 

@@ -102,9 +102,7 @@ class MitMotor(BusMotor):
         self._request(self._frames.command(torque) if self._on else self._frames.disable())
 
     def read(self, meanwhile: Callable[[], None] | None = None) -> MotorSample:
-        """Return the answer to the last command, or to a request of its own. Raises NoReply, PortLost.
-
-        """
+        """Return the answer to the last command, or to a request of its own. Raises NoReply, PortLost."""
         if not self._asked:
             self.write(0.0)
         self._asked = False
