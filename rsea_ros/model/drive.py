@@ -133,6 +133,7 @@ def restarts(record: Record, start: float, step: float, *, from_rest: bool) -> t
     start: s, of its first step; from_rest: it began at angle zero.
     """
     states: list[Restart] = []
+    origin = state_at(record, start, start)[0] if from_rest else 0.0
     for end in (end - ON_GRID * step for _, end in lost_commands(record)):
         moves = next((n for n in ("velocity", "position", "deflection", "ft") if _from(record, n, end)), "")
         t, y = _from(record, moves, end) or (np.full(2, end), np.zeros(2))
@@ -143,7 +144,7 @@ def restarts(record: Record, start: float, step: float, *, from_rest: bool) -> t
             states.append((k, SpringStart(moves, 0.5 * float(y[0] + y[1]), rate)))
             continue
         position, velocity = state_at(record, end, start + k * step)
-        states.append((k, (position - state_at(record, start, start)[0] * from_rest, velocity)))
+        states.append((k, (position - origin, velocity)))
     return tuple(states)
 
 

@@ -158,10 +158,10 @@ def paused_steps(record: Record, name: str) -> BoolArray:
 def _goes_on(t: FloatArray, start: float, stop: float, near: float = 0.0) -> bool:
     """Return whether stamps lie all about a span, s. near: so close to each other is close enough, s."""
     around = t[max(0, np.searchsorted(t, start, "right") - 1) : np.searchsorted(t, stop) + 1]
-    ends = [[] if len(around) and side * (around[k] - at) >= 0.0 else [at]
-            for k, at, side in ((0, start, -1.0), (-1, stop, 1.0))]  # fmt: skip
-    longest = float(np.max(np.diff(np.concatenate([ends[0], around, ends[1]]))))
-    return longest <= max(near, _THROUGHOUT * (stop - start))
+    if not len(around):
+        return False
+    longest = np.max(np.diff(around, prepend=min(start, around[0]), append=max(stop, around[-1])))
+    return bool(longest <= max(near, _THROUGHOUT * (stop - start)))
 
 
 def _hold_commands(record: Record, name: str, held: BoolArray) -> Channel:
