@@ -72,7 +72,8 @@ def _torque_held(record: Record, long: IntArray) -> dict[int, bool]:
         return {}
     most = _LOST**2 * float(np.mean(off[known & ~paused]))
     differ = most < float(np.mean(np.square(np.diff(command.y))))  # else one command is as good as the next
-    within = {k: off[known & (hold == k)] for k in long.tolist()}
+    later = known & (torque.t > command.t[hold] + (1.0 + AT_EDGE) / command.rate)  # than any command acts
+    within = {k: off[later & (hold == k)] for k in long.tolist()}
     far = {k: bool(np.mean(o) > most) for k, o in within.items() if len(o)}
     return {k: not is_far for k, is_far in far.items() if is_far or differ}
 
