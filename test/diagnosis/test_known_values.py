@@ -1,24 +1,20 @@
 """What a model pays for values outside the doubt that the rig states, against what it gains."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
+from runs import RIG, excited, only, trying
 from scripted_scores import model
 
 from rsea_ros.diagnosis import next_experiment
 from rsea_ros.diagnosis.criteria import break_tie, refusal
 from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.diagnosis.score import likelier_by
-from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings
-from rsea_ros.effects.catalogue import catalogue
-from rsea_ros.identification.excitation import ExcitationSettings, chirp
-from rsea_ros.identification.unknowns import Unknown, with_effect
-from rsea_ros.model.rig_file import load_rig
-from rsea_ros.model.simulation import synthesize
-from rsea_ros.records.record import Channel, Record
+from rsea_ros.diagnosis.settings import DEFAULT
+from rsea_ros.identification.unknowns import Unknown
+from rsea_ros.records.record import Channel
 
 FRICTION, GAP, STOP = "coulomb_friction", "backlash", "hard_stop"
+ASKED = {"amplitude": 15.0, "noise": 0.3, "low": 0.1, "high": 60.0}
 GAIN = 40 * 100 * (1.0 - 0.25)
 """Twice the log of the odds that half of the residual is worth: 40 blocks of 100 samples of white noise."""
 
@@ -64,13 +60,9 @@ def test_a_wide_doubt_concerns_the_order_of_magnitude(spread, value, sigmas):
 def test_a_rig_that_is_wrong_decides_between_no_two_causes():
     """A wrong motor constant and a wrong gain differ by the rig's values alone, and one of these is off."""
     name, value, cause, rival = "spring.stiffness", 1.6, "ft_gain_error", "torque_constant_error"
-    stated = load_rig("paper_high_impedance")
-    truth = with_effect(stated.with_values({name: value * stated[name]}), cause, {"gain": 0.88})
-    asked = ExcitationSettings(rate=280.0, duration=12.0, amplitude=15.0, noise=0.3, low=0.1, high=60.0)
-    command = chirp(asked)
-    record = synthesize(truth, Channel(np.arange(len(command)) / 280.0, command), seed=7)
-    tried = {cause, rival, "current_loop_lag", "coulomb_friction"}
-    found = diagnose([record], stated, settings=DiagnosisSettings(without=frozenset(catalogue()) - tried))
+    truth = RIG.with_values({name: value * RIG[name]}).with_effect(cause, gain=0.88)
+    record = excited(truth, "chirp", sensors=7, duration=12.0, **ASKED)
+    found = diagnose([record], RIG, settings=trying(cause, rival, "current_loop_lag", "coulomb_friction"))
     (named,) = found.causes
     assert named.status == "one_of"
     assert {named.name, *(a.name for a in found.alternatives)} == {cause, rival}
@@ -82,18 +74,12 @@ def test_what_came_later_does_not_decide_between_two_causes_either(monkeypatch):
     The two were weighed beside the model of their step, which lacked the delay. The stated stiffness (5 %)
     hardly tells a torque constant of 0.94 from a gain.
     """
-    stated = load_rig("paper_high_impedance")
-    rubs = with_effect(stated, "coulomb_friction", {"torque": 2.0})
-    truth = with_effect(rubs, "torque_constant_error", {"gain": 0.94})
-    asked = ExcitationSettings(rate=280.0, duration=6.0, amplitude=15.0, noise=0.3, low=0.1, high=60.0)
-    command = chirp(asked)
-    run = synthesize(truth, Channel(np.arange(len(command)) / 280.0, command), seed=7)
-    late = Channel(run["ft"].t + 6e-3, run["ft"].y)
-    record = Record({"command": run["command"], "position": run["position"], "ft": late}, "late")
-    tried = {"torque_constant_error", "ft_gain_error", "ft_delay", "ft_sensor_lag", "coulomb_friction"}
+    truth = RIG.with_effect("coulomb_friction", torque=2.0).with_effect("torque_constant_error", gain=0.94)
+    run = only(excited(truth, "chirp", sensors=7, duration=6.0, **ASKED), "position", "ft")
+    record = run.with_channels(ft=Channel(run["ft"].t + 6e-3, run["ft"].y))
+    tried = ("torque_constant_error", "ft_gain_error", "ft_delay", "ft_sensor_lag", "coulomb_friction")
     monkeypatch.setattr(next_experiment, "_LENGTH", 4.0)  # of the run that would decide: not asked for here
-    settings = DiagnosisSettings(without=frozenset(catalogue()) - tried)
-    found = diagnose([record], stated, settings=settings)
+    found = diagnose([record], RIG, settings=trying(*tried))
     status = {c.name: c.status for c in found.causes}
     assert status == {
         "coulomb_friction": "confirmed", "ft_delay": "confirmed", "torque_constant_error": "one_of"

@@ -1,7 +1,5 @@
 """The doubt of a fit beside the formulas of its sources, and what is said of values that data leave open."""
 
-from __future__ import annotations
-
 import math
 from types import SimpleNamespace
 
@@ -49,31 +47,34 @@ def case(drive=None, **measured):
 
 def problem(unknowns, *cases, loop=None, free=()):
     rig = SimpleNamespace(loop=loop, linear=False, free=lambda: free)
-    return SimpleNamespace(
-        unknowns=tuple(unknowns), cases=cases, rig=rig, present=lambda c: list(c.measured),
-        residual=lambda theta: J @ theta,
-    )  # fmt: skip
+    return SimpleNamespace(unknowns=tuple(unknowns), cases=cases, rig=rig, present=lambda c: list(c.measured))
 
 
 J, R = RNG.standard_normal((600, 3)), 2.0 * np.repeat(RNG.standard_normal(60), 10)
 DOUBTS = np.array([0.5, 2.0, 1.0])
 
 
-def solved(doubts=DOUBTS, jacobian=J, residual=R, drive=None):
-    made = problem([unknown(n, doubt=d) for n, d in zip("abc", doubts, strict=True)], case(drive, ft=T))
+def solved(jacobian=J, residual=R, drive=None):
+    measured = case(drive, ft=T)
+    measured.mask["ft"] = np.arange(600) < len(residual)
+    made = problem([unknown(n, doubt=d) for n, d in zip("abc", DOUBTS, strict=True)], measured)
+    made.residual = lambda theta: J[: len(residual)] @ theta
     return Solution(made, np.array([1.0, 2.0, 3.0]), residual, jacobian, 0.0)
 
 
-def test_the_covariance_is_whites_sandwich_over_blocks_of_a_second_beside_the_prior():
-    found = confidence_of(solved())
-    inverse = np.linalg.inv(J.T @ J + np.diag(1.0 / DOUBTS**2))
-    scores = np.array([J[100 * k : 100 * k + 100].T @ R[100 * k : 100 * k + 100] for k in range(6)])
+@pytest.mark.parametrize(("seconds", "corrected"), [(6, 6 / 3), (3, 4.0)])
+def test_the_covariance_is_whites_sandwich_over_blocks_of_a_second_beside_the_prior(seconds, corrected):
+    """Times n / (n - p) of n blocks and p unknowns, four at most."""
+    j, r = J[: 100 * seconds], R[: 100 * seconds]
+    found = confidence_of(solved(j, r))
+    inverse = np.linalg.inv(j.T @ j + np.diag(1.0 / DOUBTS**2))
+    scores = np.array([j[100 * k : 100 * k + 100].T @ r[100 * k : 100 * k + 100] for k in range(seconds)])
     assert BLOCK == 1.0
-    middle = scores.T @ scores * 6.0 / max(6 - 3, 6 / 4.0) + np.diag(1.0 / DOUBTS**2)
+    middle = scores.T @ scores * corrected + np.diag(1.0 / DOUBTS**2)
     expected = inverse @ middle @ inverse
     larger = np.sqrt(np.maximum(1.0, np.diag(inverse) / np.diag(expected)))
     assert found.covariance == pytest.approx(expected * np.outer(larger, larger), rel=1e-6)
-    assert found.information == pytest.approx(J.T @ J) and found.theta.tolist() == [1.0, 2.0, 3.0]
+    assert found.information == pytest.approx(j.T @ j) and found.theta.tolist() == [1.0, 2.0, 3.0]
     sd = np.sqrt(np.diag(found.covariance))
     assert found.correlation == pytest.approx(found.covariance / np.outer(sd, sd))
     none = Confidence(np.zeros(2), np.diag([4.0, 0.0]), np.zeros(2), np.zeros((2, 2)))
