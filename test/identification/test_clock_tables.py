@@ -1,7 +1,5 @@
 """Which clocks a fit asks for, as tables: small linear problems whose answers are worked out by hand."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

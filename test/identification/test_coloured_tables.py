@@ -1,7 +1,5 @@
 """Noise or misfit: residuals that pass for noise of a sensor, and misfits too small to be seen and not."""
 
-from __future__ import annotations
-
 import math
 from types import SimpleNamespace
 

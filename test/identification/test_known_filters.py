@@ -1,7 +1,5 @@
 """Sensors that are known to filter, on a bench in plain Python that shares no code with the simulation."""
 
-from __future__ import annotations
-
 import functools
 import math
 from dataclasses import replace

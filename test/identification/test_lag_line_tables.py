@@ -1,7 +1,5 @@
 """The line of a channel's lag as tables: signals whose lag is known at each instant in, the line out."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The noise after a fit as tables: residuals of known power and scripted decisions in, the noise out."""
 
-from __future__ import annotations
-
 import math
 from types import MappingProxyType, SimpleNamespace
 
@@ -28,9 +26,7 @@ def alternate(amplitude, size=4096):
 def case(noise, drive=DRIVE, least=None, mask=None, first=START, **measured):
     times = {n: first + np.arange(len(y)) / RATE for n, y in measured.items()}
     masks = {n: np.ones(len(y), bool) for n, y in measured.items()}
-    return Case(
-        drive, times, measured, MappingProxyType(noise), {**masks, **(mask or {})}, least=least or {}
-    )
+    return Case(drive, times, measured, MappingProxyType(noise), {**masks, **(mask or {})}, least=least or {})
 
 
 class World:

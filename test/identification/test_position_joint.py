@@ -1,7 +1,5 @@
 """Joints commanded by positions, identified in their loop: values, gains, and what is not determined."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 

@@ -1,12 +1,9 @@
 """Lines of a response: each method beside scipy's, or beside least squares and periods made by hand."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy import signal
 
-from rsea_ros.errors import IdentificationError
 from rsea_ros.identification import local_polynomial as lpm
 from rsea_ros.identification.frequency_response import (
     Periods,
@@ -16,7 +13,6 @@ from rsea_ros.identification.frequency_response import (
     suits,
     welch,
 )
-from rsea_ros.records.record import Channel, Record
 
 H = 1.0 / 200.0
 RNG = np.random.default_rng(5)
@@ -181,41 +177,3 @@ def test_a_stretch_is_the_longest_in_which_the_command_changes() -> None:
     assert found.frequency[0] == pytest.approx(8.0 / (499 * H))
     few = found.up_to(found.frequency[3])
     assert len(few.frequency) == len(few.response) == len(few.sd) == len(few.coherence) == len(few.noise) == 4
-
-
-def test_the_interval_of_few_degrees_of_freedom_is_that_of_fisher() -> None:
-    """|error|^2 over its estimated variance follows F(2, 2 m); 1.73 sd is its 95 % point for many."""
-    from scipy.stats import f
-
-    for m in (1.0, 3.0, 40.0):
-        expected = np.sqrt(f.ppf(0.95, 2.0, 2.0 * m) / -np.log(0.05))
-        assert lpm.widen(2.0, m) == pytest.approx(2.0 * expected)
-    assert lpm.widen(2.0, 0.5) == lpm.widen(2.0, 1.0)
-
-
-def test_usable_samples_are_finite_and_their_stamps_rise() -> None:
-    t = np.arange(40.0)
-    t[5], t[9], y = t[4], np.nan, np.arange(40.0)
-    y[7] = np.inf
-    kept = lpm.usable(Channel(t, y), "x")
-    assert kept.y.tolist() == [k for k in range(40) if k not in (5, 7, 9)]
-    lpm.usable(Channel(np.arange(32.0), y[:7].repeat(5)[:32]), "x")
-    with pytest.raises(IdentificationError, match="31 usable samples"):
-        lpm.usable(Channel(np.arange(31.0), np.zeros(31)), "x")
-
-
-def test_a_channel_beside_the_command_is_shifted_as_little_as_possible() -> None:
-    t = H * np.arange(400)
-    u, late = RNG.standard_normal(400), 0.3 * H
-    record = Record({"command": Channel(t, u), "ft": Channel(t[20:] + late, np.arange(380.0))})
-    found = lpm.align(record, "ft")
-    assert (found.start, found.delay, found.period) == pytest.approx((20 * H, late, H))
-    assert found.command.tolist() == pytest.approx(u[20:].tolist())
-    assert found.output.tolist() == list(range(380)) and found.measured.all()
-    assert found.offsets == pytest.approx([0.3]) and not found.held
-    gone = np.r_[0:100, 110:380]
-    some = Channel(t[20:][gone], np.arange(380.0)[gone])
-    lost = lpm.align(Record({"command": Channel(t, u), "ft": some}), "ft")
-    assert np.flatnonzero(~lost.measured).tolist() == list(range(100, 110))
-    with pytest.raises(IdentificationError, match="overlap for 31 samples"):
-        lpm.align(Record({"command": Channel(t, u), "ft": Channel(t[31] - t[63::-1], u[:64])}), "ft")

@@ -1,19 +1,15 @@
 """The solver on curves whose minimum is known, and on simulations that run away."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
 import pytest
+from runs import RIG, excited
 
-from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.identification.problem import Problem, case_from
 from rsea_ros.identification.solver import central_jacobian, jacobian, jacobian_columns, power, solve
 from rsea_ros.identification.unknowns import Unknown, apply, start_vector, unknowns_of_rig
-from rsea_ros.model.rig_file import load_rig
-from rsea_ros.model.simulation import synthesize
-from rsea_ros.records.record import MEASURED, Channel
+from rsea_ros.records.record import MEASURED
 
 T, NOISE = np.linspace(0.0, 1.0, 200), 1e-4
 
@@ -28,10 +24,8 @@ class Decay:
 
     @property
     def unknowns(self):
-        return tuple(
-            Unknown(name, start, "1", 0.0, 100.0, False, np.inf, 1.0)
-            for name, start in zip(("a", "b"), self.start, strict=True)
-        )
+        starts = zip(("a", "b"), self.start, strict=True)
+        return tuple(Unknown(name, start, "1", 0.0, 1e4, False, np.inf, 1.0) for name, start in starts)
 
     def residual(self, theta):
         if theta[1] >= self.cliff:
@@ -39,12 +33,9 @@ class Decay:
         return (theta[0] * np.exp(-theta[1] * T) - self.truth[0] * np.exp(-self.truth[1] * T)) / NOISE
 
 
-def test_the_minimum_of_a_curve_is_found():
-    assert solve(Decay()).theta == pytest.approx([2.0, 3.0], rel=1e-5)
-
-
-def test_a_cliff_behind_the_minimum_is_avoided():
+def test_the_minimum_of_a_curve_is_found_and_a_cliff_behind_it_avoided():
     """A step over the cliff is shortened; an unknown whose derivative would cross it is held for a while."""
+    assert solve(Decay()).theta == pytest.approx([2.0, 3.0], rel=1e-5)
     solution = solve(Decay(start=(1.0, 3.4), cliff=3.40001))
     assert np.isfinite(solution.cost) and solution.theta[1] < 3.40001
     assert solve(Decay(cliff=3.1)).theta == pytest.approx([2.0, 3.0], rel=1e-5)
@@ -55,11 +46,6 @@ class Bent(Decay):
     """Rosenbrock's valley y = x^2: Marquardt's steps along it are tiny."""
 
     truth: tuple[float, float] = (40.0, 1600.0)
-    start: tuple[float, float] = (1.0, 1.0)
-
-    @property
-    def unknowns(self):
-        return tuple(Unknown(n, 1.0, "1", 0.0, 1e4, False, np.inf, 1.0) for n in ("a", "b"))
 
     def residual(self, theta):
         return np.array([10.0 * (theta[1] - theta[0] ** 2), theta[0] - self.truth[0]])
@@ -89,20 +75,16 @@ def test_the_power_of_a_diverged_simulation_is_infinite(worst):
 
 def test_a_value_that_may_vanish_is_zero_where_only_rounding_is_left_of_it():
     """A fit ended at a damping of 9e-15 N m s/rad, which no rig may have: the diagnosis broke off."""
-    rig = load_rig("paper_high_impedance")
-    unknowns = unknowns_of_rig(rig)
+    unknowns = unknowns_of_rig(RIG)
     theta = start_vector(unknowns)
     theta[[u.name for u in unknowns].index("spring.damping")] = 9.12863e-15
-    assert apply(rig, unknowns, theta)[0]["spring.damping"] == 0.0
+    assert apply(RIG, unknowns, theta)[0]["spring.damping"] == 0.0
 
 
 def test_derivatives_are_exact_enough_for_the_end_of_a_bent_valley():
     """Curvature taken for slope, 2.5e-4 of it: a soft base stayed far from its minimum, a mode was named."""
-    rig = load_rig("paper_high_impedance")
-    command = excitation("multisine", ExcitationSettings(rate=280.0, duration=10.0, amplitude=20.0))
-    record = synthesize(rig, Channel(np.arange(len(command)) / 280.0, command), seed=1)
-    case = case_from(record, rig)
-    problem = Problem((case,), rig, unknowns_of_rig(rig), MEASURED)
+    record = excited(RIG, "multisine", sensors=1, duration=10.0, amplitude=20.0)
+    problem = Problem((case_from(record, RIG),), RIG, unknowns_of_rig(RIG), MEASURED)
     theta = start_vector(problem.unknowns)
     exact = central_jacobian(problem, theta)
     off = jacobian(problem, theta, problem.residual(theta)) - exact

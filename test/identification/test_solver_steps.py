@@ -1,7 +1,5 @@
 """Steps of the solver: bounds, priors, kept derivatives and descents beside what linear algebra gives."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -66,9 +64,7 @@ def test_a_linear_fit_is_the_ridge_of_its_priors_in_one_step():
 def test_a_step_stays_inside_its_bounds_and_the_rest_makes_up_for_it():
     free = np.linalg.lstsq(A, B, rcond=None)[0]
     wide = np.full(3, 9.0)
-    for low, high in (
-        (-wide, wide), ([free[0] + 0.2, -9.0, -9.0], wide), (-wide, [9.0, free[1] - 0.1, 9.0]),
-    ):  # fmt: skip
+    for low, high in ((-wide, wide), ([free[0] + 0.2, -9.0, -9.0], wide), (-wide, [9.0, free[1] - 0.1, 9.0])):
         unknowns = tuple(unknown(n, low=a, high=b) for n, a, b in zip("xyz", low, high, strict=True))
         theta = np.clip([0.5, -0.5, 0.2], low, high)
         found = bounded_step(Linear(unknowns), theta, A.T @ A, A.T @ (A @ theta - B))

@@ -1,34 +1,24 @@
 """Values that the data do not determine keep the whole doubt of their bounds."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from runs import RIG, excited
 
-from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.identification import confidence
 from rsea_ros.identification.confidence import interval
-from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.identification.fit import fit
 from rsea_ros.identification.problem import case_from
 from rsea_ros.identification.result import ParameterEstimate, Remark, shares_from_data
 from rsea_ros.identification.unknowns import Unknown
-from rsea_ros.model.rig import EffectSetting
-from rsea_ros.model.rig_file import load_rig
-from rsea_ros.model.simulation import synthesize
-from rsea_ros.records.record import Channel
 
 
 @pytest.fixture(scope="module")
 def solution():
     """The fit of a rig with a hardening spring to 4 s."""
-    rig = load_rig("paper_high_impedance")
-    command = excitation("multisine", ExcitationSettings(rate=280.0, duration=4.0, period=4.0))
-    record = synthesize(rig, Channel(np.arange(len(command)) / 280.0, command), seed=3)
-    spring = EffectSetting("nonlinear_spring", effect_named("nonlinear_spring").typical)
-    return fit((case_from(record, rig),), rig.with_effects(spring))[0]
+    record = excited(RIG, "multisine", sensors=3, duration=4.0, period=4.0)
+    return fit((case_from(record, RIG),), RIG.with_effect("nonlinear_spring"))[0]
 
 
 def test_an_unknown_without_sensitivity_has_the_widest_interval_and_is_reported(monkeypatch, solution):

@@ -1,23 +1,19 @@
 """The command between two samples: the last one, a line, or the band-limited curve (rig key `hold`)."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from runs import RATE, RIG
 from scipy.signal import StateSpace, lsim
 
 from rsea_ros.errors import RigError
 from rsea_ros.model.drive import coarser, drive_from
 from rsea_ros.model.propagator import propagator, state_space
 from rsea_ros.model.rig_document import rig_from_document
-from rsea_ros.model.rig_file import load_rig, rig_to_document
+from rsea_ros.model.rig_file import rig_to_document
 from rsea_ros.model.simulation import simulate
 from rsea_ros.records.record import Channel, Record
-
-RIG = load_rig("paper_high_impedance")
-RATE = 280.0
 
 
 def record_of(command, shift=0.0):

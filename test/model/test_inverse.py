@@ -1,7 +1,5 @@
 """A measured motion and the torque that it takes, beside the sine and the equation of motion put in."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

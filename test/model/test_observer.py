@@ -1,7 +1,5 @@
 """The observer on simulated benches: its stated uncertainty holds for samples in any order and rhythm."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Gaps of a record: the simulation begins anew behind them, and the filter smears them over nothing."""
 
-from __future__ import annotations
-
 import functools
 
 import numpy as np

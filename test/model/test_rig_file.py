@@ -1,7 +1,5 @@
 """Rigs and their files: values by name, impossible structures, round trips."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -111,24 +109,17 @@ def test_every_field_refuses_nonsense():
 
 
 @pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        ({"clamped": frozenset({"left"})}, "clamped end 'left', expected one of housing_end, spring_end"),
-        (
-            {"clamped": frozenset({"spring_end"})},
-            r"housing_end.inertia is missing, expected a value in kg·m²",
-        ),
-    ],
-)
-def test_structures_that_cannot_be_are_refused(changes, message):
+    ("clamped", "message"),
+    [("left", "clamped end 'left', expected one of housing_end, spring_end"),
+     ("spring_end", r"housing_end.inertia is missing, expected a value in kg·m²")],
+)  # fmt: skip
+def test_structures_that_cannot_be_are_refused(clamped, message):
     with pytest.raises(RigError, match=f"^rig paper_high_impedance: {message}"):
-        replace(PAPER, **changes)
+        replace(PAPER, clamped=frozenset({clamped}))
 
 
 def test_an_unknown_field_is_refused():
-    with pytest.raises(
-        RigError, match=r"rotor\.mass: no such rig field, expected one of rotor.reflected_inertia"
-    ):
+    with pytest.raises(RigError, match=r"rotor\.mass: no such rig field, expected one of rotor.reflected"):
         Rig("r", {"rotor.mass": Quantity(1.0)})
     with pytest.raises(RigError, match=r"rotor\.mass: no such rig field"):
         PAPER["rotor.mass"]

@@ -1,7 +1,5 @@
 """Nonsense in a rig file is refused in one line with file, line, field, value and expectation."""
 
-from __future__ import annotations
-
 import copy
 
 import pytest

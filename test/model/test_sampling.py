@@ -1,7 +1,5 @@
 """Simulated channels between the ends of steps: exact where cubics are, and at the ends as they are."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Known filters of sensors against slow plain ones: lsim on a fine grid, loops without our formulas."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """The simulation, whole or a sample at a time, against independent computations of the same numbers."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -14,7 +12,7 @@ from scipy.signal import lsim
 
 from rsea_ros.model import outputs
 from rsea_ros.model.prediction_errors import in_phase, predict
-from rsea_ros.model.rig import EffectSetting, Rig
+from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import Plant, build, run, simulate, synthesize
 from rsea_ros.model.transfer import frequency_response
@@ -193,7 +191,7 @@ def test_reset_begins_again():
     np.testing.assert_array_equal(record_of(plant, command), first)
 
 
-def hum(phase: float) -> Rig:
+def hum(phase):
     parameters = {"amplitude": 0.2, "frequency": 50.02, "phase": phase}
     return load_rig("paper_high_impedance").with_effects(EffectSetting("mains_interference", parameters))
 

@@ -1,7 +1,5 @@
 """The sign of every gear train, from its rolling contacts."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
