@@ -1,7 +1,5 @@
 """The criteria at their limits: scores whose ratios are exact in binary and lie exactly on a limit."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Faults of the data: each kind put into a good record is found in its channel and in no other."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from independent.bench import drawn_bench, record_run

@@ -20,6 +20,7 @@ from rsea_ros.model.rig_file import load_rig
 from rsea_ros.records.record import Channel, Record
 from rsea_ros.report.remark_words import remark_sentences
 
+pytestmark = pytest.mark.usefixtures("brief_next_run")
 SWEEP = {"duration": 10.0, "noise": 0.0, "low": 0.2, "high": 30.0}
 
 

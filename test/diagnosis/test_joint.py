@@ -14,6 +14,7 @@ from rsea_ros.model.rig_file import load_rig
 from rsea_ros.records.record import Channel, Record
 from rsea_ros.report.remark_words import remark_sentences
 
+pytestmark = pytest.mark.usefixtures("brief_next_run")
 TRIED = ("coulomb_friction", "command_delay", "backlash", "stribeck_friction", "current_loop_lag")
 SETTINGS = trying(*TRIED, max_causes=2)
 

@@ -5,7 +5,6 @@ import pytest
 from runs import RIG, excited, only, trying
 from scripted_scores import model
 
-from rsea_ros.diagnosis import next_experiment
 from rsea_ros.diagnosis.criteria import break_tie, refusal
 from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.diagnosis.score import likelier_by
@@ -13,6 +12,7 @@ from rsea_ros.diagnosis.settings import DEFAULT
 from rsea_ros.identification.unknowns import Unknown
 from rsea_ros.records.record import Channel
 
+pytestmark = pytest.mark.usefixtures("brief_next_run")
 FRICTION, GAP, STOP = "coulomb_friction", "backlash", "hard_stop"
 ASKED = {"amplitude": 15.0, "noise": 0.3, "low": 0.1, "high": 60.0}
 GAIN = 40 * 100 * (1.0 - 0.25)
@@ -68,7 +68,7 @@ def test_a_rig_that_is_wrong_decides_between_no_two_causes():
     assert {named.name, *(a.name for a in found.alternatives)} == {cause, rival}
 
 
-def test_what_came_later_does_not_decide_between_two_causes_either(monkeypatch):
+def test_what_came_later_does_not_decide_between_two_causes_either():
     """Beside friction and an F/T sensor 6 ms late it was "confirmed" at 0.93, the F/T's gain at 0.07.
 
     The two were weighed beside the model of their step, which lacked the delay. The stated stiffness (5 %)
@@ -78,7 +78,6 @@ def test_what_came_later_does_not_decide_between_two_causes_either(monkeypatch):
     run = only(excited(truth, "chirp", sensors=7, duration=6.0, **ASKED), "position", "ft")
     record = run.with_channels(ft=Channel(run["ft"].t + 6e-3, run["ft"].y))
     tried = ("torque_constant_error", "ft_gain_error", "ft_delay", "ft_sensor_lag", "coulomb_friction")
-    monkeypatch.setattr(next_experiment, "_LENGTH", 4.0)  # of the run that would decide: not asked for here
     found = diagnose([record], RIG, settings=trying(*tried))
     status = {c.name: c.status for c in found.causes}
     assert status == {

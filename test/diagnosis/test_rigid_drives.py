@@ -1,7 +1,5 @@
 """Drives and joints without a spring: the torque that they lack, and its ripple over the rotor."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

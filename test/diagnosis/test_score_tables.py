@@ -1,7 +1,5 @@
 """Scores by hand: residuals over the noise by block, gains, and how far data may outweigh known values."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from types import SimpleNamespace

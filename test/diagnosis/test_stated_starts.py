@@ -13,6 +13,7 @@ from rsea_ros.diagnosis.criteria import break_tie
 from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.model.rig_file import load_rig
 
+pytestmark = pytest.mark.usefixtures("brief_next_run")
 LAG, DELAY = "current_loop_lag", "command_delay"
 SETTINGS = trying(LAG, DELAY, "current_loop_overshoot")
 RIG = load_rig("sea_two_encoders")

@@ -1,7 +1,5 @@
 """A proof that no run separates two models stands on the larger of both bounds, and on linear laws alone."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import pytest

@@ -1,7 +1,5 @@
 """Faults of recording, put into a finished record; each with the share of samples that it touches."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from rsea_ros.records.record import Channel, Record

@@ -1,7 +1,5 @@
 """Effects that can be hidden in the second bench, by name: those of the contract, and others."""
 
-from __future__ import annotations
-
 from types import MappingProxyType
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The paper's numbers beside ours: agreements, disagreements, and every contradiction with its number."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -69,11 +67,7 @@ def test_both_readings_of_the_lumped_model_miss_the_resonance():
 
 @pytest.mark.parametrize(
     ("hz", "unlumped", "moving"),
-    [
-        (6.1, -21.3, 4.9),
-        (19.8, -8.8, -25.7),
-        (33.0, -24.7, -31.6),
-    ],
+    [(6.1, -21.3, 4.9), (19.8, -8.8, -25.7), (33.0, -24.7, -31.6)],
 )
 def test_figure_18_has_its_reference_numbers(hz, unlumped, moving):
     rigs = list(readings(load_rig("paper_moving_output")).values())
