@@ -7,18 +7,10 @@ import pytest
 from runs import RATE, RIG, command_of, excited, trying
 
 from rsea_ros import simulate
+from rsea_ros.diagnosis import stretches
 from rsea_ros.diagnosis.data_split import blocks_of, short_pieces_of
 from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.diagnosis.settings import DiagnosisSettings, StretchSettings
-from rsea_ros.diagnosis.stretches import (
-    in_stretches,
-    on_slots,
-    settings_for,
-    simulated_time,
-    slowest_decay,
-    spread_slots,
-    with_worst,
-)
 from rsea_ros.identification.noise_level import reestimate_noise
 from rsea_ros.identification.problem import Problem, case_from
 from rsea_ros.identification.solver import serial
@@ -46,19 +38,19 @@ def problem_of(case, rig=RIG):
 
 
 def test_spread_slots_reach_from_the_first_to_the_last():
-    assert spread_slots(37, 5).tolist() == [0, 9, 18, 27, 36]
-    assert spread_slots(3, 8).tolist() == [0, 1, 2]
+    assert stretches.spread_slots(37, 5).tolist() == [0, 9, 18, 27, 36]
+    assert stretches.spread_slots(3, 8).tolist() == [0, 1, 2]
 
 
 def test_the_worst_slots_come_beside_the_spread_ones_in_time():
     misfit = np.array([9.0, 0.0, 1.0, 7.0, 8.0, 2.0])
-    assert with_worst(np.array([0, 5]), misfit, 4).tolist() == [0, 3, 4, 5]
-    assert with_worst(np.array([0, 5]), misfit, 2).tolist() == [0, 5]
+    assert stretches.with_worst(np.array([0, 5]), misfit, 4).tolist() == [0, 3, 4, 5]
+    assert stretches.with_worst(np.array([0, 5]), misfit, 2).tolist() == [0, 5]
 
 
 def test_a_stretch_keeps_whole_blocks_with_their_sets_and_stamps(drifting):
     _, case = drifting
-    cut = on_slots(case, [0, 2, 3, 7], SHORT)
+    cut = stretches.on_slots(case, [0, 2, 3, 7], SHORT)
     for n in case.t:
         block = blocks_of(cut, n, SHORT.blocks)
         whole = blocks_of(case, n, SHORT.blocks)
@@ -70,16 +62,16 @@ def test_a_stretch_keeps_whole_blocks_with_their_sets_and_stamps(drifting):
 
 def test_neighbouring_slots_are_simulated_in_one_go_and_the_rest_is_not(drifting):
     _, case = drifting
-    cut = on_slots(case, [0, 2, 3, 7], SHORT)
+    cut = stretches.on_slots(case, [0, 2, 3, 7], SHORT)
     spans = [(a * cut.drive.step, b * cut.drive.step) for a, b in cut.drive.spans]
     assert [a for a, _ in spans] == pytest.approx([0.0, 15.0, 55.0], abs=0.01)
     assert [b for _, b in spans] == pytest.approx([8.0, 32.0, 64.0], abs=0.02)
-    assert simulated_time(cut, SHORT) == pytest.approx(32.0, abs=0.1)
+    assert stretches.simulated_time(cut, SHORT) == pytest.approx(32.0, abs=0.1)
 
 
 def test_a_stretch_is_simulated_as_in_the_whole_record_drifts_included(drifting):
     rig, case = drifting
-    cut = on_slots(case, [0, 3, 7], SHORT)
+    cut = stretches.on_slots(case, [0, 3, 7], SHORT)
     (whole,), (part,) = (problem_of(c, rig).outputs(np.zeros(0)) for c in (case, cut))
     for n, values in part.items():
         same = np.interp(cut.t[n], case.t[n], whole[n])
@@ -88,7 +80,7 @@ def test_a_stretch_is_simulated_as_in_the_whole_record_drifts_included(drifting)
 
 def test_pieces_of_a_cut_record_lie_in_its_stretches(drifting):
     rig, case = drifting
-    cut = on_slots(case, [1, 2, 5, 6], SHORT)
+    cut = stretches.on_slots(case, [1, 2, 5, 6], SHORT)
     pieces = short_pieces_of(cut, problem_of(cut, rig).outputs(np.zeros(0))[0], SHORT)
     assert len(pieces) > 5
     for piece in pieces:
@@ -105,7 +97,7 @@ def test_the_samples_of_a_problem_do_not_grow_with_the_record():
     t = (np.arange(round(4.0 * RATE * seconds)) + 1.0) / (4.0 * RATE)
     slow = record_of(seconds)
     fast = {n: Channel(t, np.interp(t, slow[n].t, slow[n].y)) for n in ("position", "velocity")}
-    used = in_stretches(problem_of(case_from(slow.with_channels(**fast), RIG)), SHORT, serial)
+    used = stretches.in_stretches(problem_of(case_from(slow.with_channels(**fast), RIG)), SHORT, serial)
     rows = len(used.residual(np.zeros(0))) / len(used.cases[0].t)
     assert rows <= 32.0 * RATE + 16
 
@@ -113,12 +105,12 @@ def test_the_samples_of_a_problem_do_not_grow_with_the_record():
 def test_a_swinging_load_has_run_ups_in_which_it_forgets_its_start():
     """Between two swinging ends 4 s left 30 times the noise of the encoder in every stretch."""
     rig = load_rig("two_moving_outputs")
-    assert slowest_decay(rig) == pytest.approx(7.28, rel=1e-2)
-    assert settings_for(RIG, DiagnosisSettings()).stretches.run_up == 4.0
-    suited = settings_for(rig, replace(SHORT, stretches=replace(SHORT.stretches, enough=160.0)))
+    assert stretches.slowest_decay(rig) == pytest.approx(7.28, rel=1e-2)
+    assert stretches.settings_for(RIG, DiagnosisSettings()).stretches.run_up == 4.0
+    suited = stretches.settings_for(rig, replace(SHORT, stretches=replace(SHORT.stretches, enough=160.0)))
     assert suited.stretches.run_up == pytest.approx(4.0 * 7.28, rel=1e-2)
     case = case_from(record_of(256.0, rig), rig)
-    (cut,) = in_stretches(problem_of(case, rig), suited, serial).cases
+    (cut,) = stretches.in_stretches(problem_of(case, rig), suited, serial).cases
     (out,) = problem_of(cut, rig).outputs(np.zeros(0))
     left = (cut.measured["position"] - out["position"])[cut.mask["position"]] / cut.noise["position"]
     assert len(cut.drive.spans) > 1
@@ -128,7 +120,7 @@ def test_a_swinging_load_has_run_ups_in_which_it_forgets_its_start():
 def test_joins_of_stretches_do_not_pass_for_noise(drifting):
     """A residual that jumps from one stretch to the next raised the F/T noise a thousandfold."""
     rig, case = drifting
-    cut = on_slots(replace(case, noise=dict.fromkeys(case.noise, 1e9)), [0, 3, 7], SHORT)
+    cut = stretches.on_slots(replace(case, noise=dict.fromkeys(case.noise, 1e9)), [0, 3, 7], SHORT)
     (out,) = problem_of(cut, rig).outputs(np.zeros(0))
     offset = 100.0 * (cut.t["ft"] > cut.start + 20.0)
     right, jumping = (reestimate_noise(cut, {**out, "ft": ft}) for ft in (out["ft"], out["ft"] + offset))

@@ -6,19 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from rsea_ros.identification.solver import (
-    Solution,
-    bounded_step,
-    broyden_update,
-    central_jacobian,
-    cores,
-    descend,
-    jacobian_columns,
-    on_cores,
-    serial,
-    solve,
-    worker_pools,
-)
+from rsea_ros.identification import solver
 from rsea_ros.identification.unknowns import JUMPING, Unknown
 
 RNG = np.random.default_rng(2)
@@ -46,7 +34,7 @@ def test_a_linear_fit_is_the_ridge_of_its_priors_in_one_step():
     weight, start = np.array([10.0, 1.0 / 0.3, 0.0]), np.array([1.0, -2.0, 0.0])
     whole, right = np.vstack([A, np.diag(weight)]), np.append(B, weight * start)
     best = np.linalg.lstsq(whole, right, rcond=None)[0]
-    found = solve(problem)
+    found = solver.solve(problem)
     assert found.theta == pytest.approx(best, abs=1e-6)
     assert found.cost == pytest.approx(float(np.sum((whole @ best - right) ** 2)))
     assert found.jacobian == pytest.approx(A, abs=1e-4)
@@ -55,9 +43,9 @@ def test_a_linear_fit_is_the_ridge_of_its_priors_in_one_step():
     assert found.values == pytest.approx(dict(zip("xyz", best, strict=True)), abs=1e-6)
     assert len(problem.asked) <= 7
     given = Linear()
-    solve(given, np.array([3.0, 3.0, 3.0]), matrix=A)
+    solver.solve(given, np.array([3.0, 3.0, 3.0]), matrix=A)
     assert len(given.asked) <= 4 and given.asked[0].tolist() == [3.0, 3.0, 3.0]
-    wrong = solve(Linear(), np.array([3.0, 3.0, 3.0]), matrix=-A)
+    wrong = solver.solve(Linear(), np.array([3.0, 3.0, 3.0]), matrix=-A)
     assert wrong.theta == pytest.approx(np.linalg.lstsq(A, B, rcond=None)[0], abs=1e-5)
 
 
@@ -67,43 +55,43 @@ def test_a_step_stays_inside_its_bounds_and_the_rest_makes_up_for_it():
     for low, high in ((-wide, wide), ([free[0] + 0.2, -9.0, -9.0], wide), (-wide, [9.0, free[1] - 0.1, 9.0])):
         unknowns = tuple(unknown(n, low=a, high=b) for n, a, b in zip("xyz", low, high, strict=True))
         theta = np.clip([0.5, -0.5, 0.2], low, high)
-        found = bounded_step(Linear(unknowns), theta, A.T @ A, A.T @ (A @ theta - B))
+        found = solver.bounded_step(Linear(unknowns), theta, A.T @ A, A.T @ (A @ theta - B))
         assert found == pytest.approx(lsq_linear(A, B, (low, high)).x, abs=1e-9)
 
 
 def test_derivatives_step_inwards_at_a_bound_and_to_both_sides_of_a_jump():
     at_bound = Linear((unknown("x", high=1.0), unknown("y"), unknown("z", scale=10.0)))
     theta = np.array([1.0, 0.5, 0.5])
-    found = jacobian_columns(at_bound, theta, at_bound.residual(theta), [2, 0])
+    found = solver.jacobian_columns(at_bound, theta, at_bound.residual(theta), [2, 0])
     assert found == pytest.approx(A[:, [2, 0]], abs=1e-4)
     steps = [(place - theta)[k] for place, k in zip(at_bound.asked[1:], (2, 0), strict=True)]
     small = at_bound.unknowns[0].difference
     assert steps == pytest.approx([10.0 * small, -small], rel=1e-6)
-    assert jacobian_columns(at_bound, theta, B, []).shape == (30, 0)
+    assert solver.jacobian_columns(at_bound, theta, B, []).shape == (30, 0)
     jumps = Linear((unknown("x", difference=JUMPING), *Linear().unknowns[1:]))
-    jacobian_columns(jumps, theta, np.full(30, 1e9), [0])
+    solver.jacobian_columns(jumps, theta, np.full(30, 1e9), [0])
     assert [place[0] for place in jumps.asked] == pytest.approx([1.0 + JUMPING, 1.0 - JUMPING])
     central = Linear((unknown("x", scale=2.0), *Linear().unknowns[1:]))
-    assert central_jacobian(central, theta) == pytest.approx(A, abs=1e-5)
+    assert solver.central_jacobian(central, theta) == pytest.approx(A, abs=1e-5)
     either = [place[0] for place in central.asked[:2]]
     assert either == pytest.approx([1.0 + 2.0 * small, 1.0 - 2.0 * small])
 
 
 def test_kept_derivatives_give_the_change_of_the_last_step_and_are_the_nearest_that_do():
     matrix, step, change = A.copy(), np.array([0.1, -0.2, 0.3]), RNG.standard_normal(30)
-    new = broyden_update(matrix, step, change)
+    new = solver.broyden_update(matrix, step, change)
     assert new @ step == pytest.approx(change)
     size = np.sqrt(np.sum(A**2, axis=0))
     scaled = (new - A) / size  # the least change of scaled derivatives lies along the scaled step
     along = size * step
     assert scaled == pytest.approx(np.outer(scaled @ along, along) / (along @ along))
-    assert broyden_update(A.copy(), np.zeros(3), np.zeros(30)) == pytest.approx(A)
+    assert solver.broyden_update(A.copy(), np.zeros(3), np.zeros(30)) == pytest.approx(A)
 
 
 def test_a_descent_is_the_ridge_about_its_start_and_is_cut_until_it_helps():
     start, information = np.array([1.0, 0.0, 0.0]), np.diag([4.0, 0.0, 1.0])
     best = np.linalg.solve(A.T @ A + information, A.T @ B + information @ start)
-    found = descend(lambda x: A @ x - B, lambda x, r: A, start, information)
+    found = solver.descend(lambda x: A @ x - B, lambda x, r: A, start, information)
     off = best - start
     assert found.theta == pytest.approx(best)
     assert found.residual == pytest.approx(A @ best - B)
@@ -114,28 +102,29 @@ def test_a_descent_is_the_ridge_about_its_start_and_is_cut_until_it_helps():
         calls.append(float(x[0]))
         return np.arctan(5.0 * x)
 
-    one = descend(steep, lambda x, r: np.diag(5.0 / (1.0 + 25.0 * x**2)), np.array([2.0]), np.zeros((1, 1)))
+    slope = lambda x, r: np.diag(5.0 / (1.0 + 25.0 * x**2))  # noqa: E731
+    one = solver.descend(steep, slope, np.array([2.0]), np.zeros((1, 1)))
     assert abs(one.theta[0]) < 0.05 and calls[0] == 2.0
     assert calls[2] - 2.0 == pytest.approx(0.5 * (calls[1] - 2.0))
     few: list[float] = []
-    descend(lambda x: (few.append(1.0), A @ x - B)[1], lambda x, r: A, start, information, rounds=1)
+    solver.descend(lambda x: (few.append(1.0), A @ x - B)[1], lambda x, r: A, start, information, rounds=1)
     assert len(few) == 2
-    stuck = descend(lambda x: A @ x - B, lambda x, r: -A, start, np.zeros((3, 3)))
+    stuck = solver.descend(lambda x: A @ x - B, lambda x, r: -A, start, np.zeros((3, 3)))
     assert stuck.theta is start
 
 
 def test_a_fit_has_the_cores_that_it_is_given():
-    before = cores()
-    with on_cores(1):
-        assert cores() == 1
-        with worker_pools() as pools:
-            assert pools.run is serial
-    assert cores() == before
-    with on_cores(3), worker_pools() as pools:
+    before = solver.cores()
+    with solver.on_cores(1):
+        assert solver.cores() == 1
+        with solver.worker_pools() as pools:
+            assert pools.run is solver.serial
+    assert solver.cores() == before
+    with solver.on_cores(3), solver.worker_pools() as pools:
         assert pools.run(lambda k: np.full(1, k), [1, 2, 3]) == [1, 2, 3] and pools.fits._max_workers == 3
 
 
 def test_values_of_a_solution_are_in_si():
     inverse = replace(unknown("k"), logarithmic=True)
-    solution = Solution(Linear((inverse,)), np.array([np.log(50.0)]), B, A, 0.0)
+    solution = solver.Solution(Linear((inverse,)), np.array([np.log(50.0)]), B, A, 0.0)
     assert solution.values == {"k": pytest.approx(50.0)}
