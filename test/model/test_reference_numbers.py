@@ -93,5 +93,6 @@ def test_table_2_is_in_the_rigs():
 
 def test_the_clamped_end_of_the_moving_output_is_the_papers_proximal_one():
     """Section 3.2.2: “distal link was left free to rotate”; Table 2: lp is fixed, ld the pendulum."""
-    assert MOVING.clamped == {MOVING.proximal}
+    assert MOVING.clamped == {MOVING.proximal} == {FT}
     assert outputs.proximal(MOVING).c == pytest.approx(outputs.end_torque(MOVING, FT).c)
+    assert outputs.distal(MOVING).c == pytest.approx(outputs.end_torque(MOVING, "housing_end").c)
