@@ -55,9 +55,9 @@ def test_the_clock_behind_jitter_and_gaps():
 
 def test_what_is_no_number_or_steps_back_is_left_out_and_too_little_refused():
     y, t = np.arange(100.0), np.arange(100.0)
-    y[5], t[10], t[20] = np.nan, np.inf, 3.0
+    y[5], t[10], t[20], t[30] = np.nan, np.inf, 3.0, t[29]
     left = usable(Channel(t, y), "bag: ft")
-    assert len(left) == 97 and {5.0, 10.0, 20.0}.isdisjoint(left.y.tolist())
+    assert len(left) == 96 and {5.0, 10.0, 20.0, 30.0}.isdisjoint(left.y.tolist())
     usable(Channel(np.arange(32.0), np.zeros(32)), "bag: ft")
     with pytest.raises(IdentificationError, match="bag: ft has 31 usable samples"):
         usable(Channel(np.arange(31.0), np.zeros(31)), "bag: ft")
