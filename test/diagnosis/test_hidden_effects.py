@@ -96,7 +96,7 @@ def test_strong_cogging_is_named_with_its_size():
     """A free simulation left 120 times the noise: a 502:1 gear settles in other detents than the real one."""
     amplitude, cycles, rng = 4.0, 8.0, np.random.default_rng(2)
     ripple = {"amplitude": amplitude, "cycles_per_revolution": cycles, "phase": float(rng.uniform(-3.0, 3.0))}
-    record = record_run(hide(drawn_bench(rng), "torque_ripple", ripple), 2001, "chirp_noise", 6.0)
+    record = record_run(hide(drawn_bench(rng), "torque_ripple", ripple), 2001, "chirp_noise", 5.0)
     diagnosis = diagnose([record], RIG, settings=trying("torque_ripple", "backlash"))
     assert diagnosis.causes[0].name == "torque_ripple"
     sizes = diagnosis.causes[0].parameters
