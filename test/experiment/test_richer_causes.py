@@ -95,7 +95,7 @@ def test_a_richer_cause_is_tested_once(log, proposal, monkeypatch):
 def stuck():
     """Return the weighing of friction by slow work in which the joint stays stuck."""
     bench = hide(Bench(), "stribeck_friction", STUCK)
-    t = np.arange(6 * 280) / 280.0
+    t = np.arange(10 * 280) / 280.0
     return weigh([record_command(bench, 0.5 * np.sin(1.6 * t), np.random.default_rng(4))], RIG, FRICTION)
 
 
