@@ -1,4 +1,4 @@
-"""The contract of every effect of the catalogue, and how a new one is added."""
+"""The contract of every effect of the catalogue; test_outside_effect.py adds one by one file."""
 
 import itertools
 from dataclasses import replace
@@ -132,42 +132,6 @@ def test_wrong_parameters_are_refused(effect):
 def test_an_unknown_effect_is_refused():
     with pytest.raises(ParameterError, match="'stickiness': not in the catalogue, expected one of"):
         effect_named("stickiness")
-
-
-NEW_EFFECT = '''
-"""Torque that a fan takes.
-
-    T = -coefficient * w * |w|
-"""
-
-from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
-from rsea_ros.effects.signal_table import GEAR_TORQUE, GEAR_VELOCITY, Port
-
-
-@compiled
-def apply(s, p, x):
-    s[GEAR_TORQUE] -= p[0] * s[GEAR_VELOCITY] * abs(s[GEAR_VELOCITY])
-
-
-EFFECT = Effect(
-    name="fan",
-    port=Port.GEAR,
-    parameters=(Parameter("coefficient", "N m s^2/rad^2", null=0.0, low=0.0, high=200.0, typical=50.0),),
-    claims=Claims("velocity", "odd", amplitude_exponent=2.0, passive=True),
-    function=apply,
-    reads=(GEAR_VELOCITY,),
-)
-'''
-
-
-def test_an_effect_is_added_by_adding_one_file(tmp_path, monkeypatch):
-    (tmp_path / "fan.py").write_text(NEW_EFFECT)
-    assert "fan" not in catalogue()
-    monkeypatch.setenv("RSEA_EFFECTS", str(tmp_path))
-    assert set(catalogue()) > set(CONTRACT)
-    driven = drive(duration=2.0)
-    sizes = [rms(difference(simulate(driven, "fan", {"coefficient": c}), simulate(driven))) for c in (0, 50)]
-    assert sizes[0] == 0.0 and sizes[1] > 10.0
 
 
 @pytest.mark.parametrize("source", ["1 / 0", "def", "import no_such_module", "raise MemoryError"])

@@ -15,7 +15,7 @@ from rsea_ros.control.uncertainty import lag_responses
 from rsea_ros.diagnosis.candidate import with_clocks_in_delays
 from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.diagnosis.naming.conclusion import undetermined_play
-from rsea_ros.effects.catalogue import effect_named
+from rsea_ros.effects.catalogue import catalogue, effect_named
 from rsea_ros.exports.bam import export_bam
 from rsea_ros.exports.mjcf import export_mjcf
 from rsea_ros.exports.urdf import export_urdf
@@ -118,6 +118,7 @@ def test_an_outside_effect_is_simulated_and_identified(record):
     identified = identify([record], guessed)
     sizes = {p.name: p.value for p in identified.parameters}
     assert sizes["paddle.coefficient"] == pytest.approx(8.0, rel=0.1)
+    assert set(catalogue()) > {"paddle", "late_bus", "worn_key", "coulomb_friction"}
 
 
 def test_a_diagnosis_names_an_outside_effect(record):

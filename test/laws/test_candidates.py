@@ -38,8 +38,10 @@ def test_the_waves_over_an_angle_are_found_whatever_follows_time(cycles):
 def test_a_wave_that_multiplies_another_signal_is_found_over_that():
     theta = travelled(9.0)
     deflection = np.cos(2.2 * theta)
-    found = periods(theta, deflection * np.sin(6.0 * theta), deflection)
-    assert found[0] == pytest.approx(6.0, abs=0.05)
+    torque = deflection * np.sin(6.0 * theta)
+    assert periods(theta, torque, deflection)[0] == pytest.approx(6.0, abs=0.05)
+    assert periods(theta, torque)[0] != pytest.approx(6.0, abs=0.05), "as a torque it has others"
+    assert periods(theta, torque, 0.0 * deflection) == []
 
 
 def test_the_lines_of_a_residual_lie_between_a_hertz_and_most_of_the_band():

@@ -15,7 +15,6 @@ from rsea_ros.effects import signal_table as st
 from rsea_ros.effects.catalogue import lend
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
 from rsea_ros.effects.signal_table import Port
-from rsea_ros.laws.candidates import periods
 from rsea_ros.laws.learn import learn
 from rsea_ros.report.law import headline
 
@@ -66,14 +65,6 @@ def test_a_stiffness_that_repeats_is_one_law_of_its_period():
     assert written.law.regressor == "deflection and position, periodic"
     assert abs(part.coefficient) == pytest.approx(300.0, rel=0.05)
     assert part.shape * RATIO == pytest.approx(900.0, rel=0.02)
-
-
-def test_waves_of_a_stiffness_have_one_period_and_those_of_a_torque_another():
-    deflection = 0.02 * np.sin(np.linspace(0.0, 300.0, 20_000))
-    torque = deflection * np.sin(900.0 * deflection)
-    assert periods(deflection, torque, deflection)[0] == pytest.approx(900.0, rel=0.02)
-    assert periods(deflection, torque)[0] != pytest.approx(900.0, rel=0.02)
-    assert periods(deflection, torque, 0.0 * deflection) == []
 
 
 def test_a_dead_band_is_a_law_of_the_command(learn_of):
