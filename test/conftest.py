@@ -83,7 +83,7 @@ PATIENT = (
 COMPUTING = (
     "golden/", "diagnosis/test_hidden_effects", "test_realdata", "test_launcher", "health/test_monitor",
     "checks/test_dead", "experiment/", "checks/test_clocks", "checks/test_gains", "laws/test_hidden_laws",
-    "report/", "effects/", "diagnosis/test_stated_starts", "control/test_controller", "test_docs",
+    "report/", "effects/", "diagnosis/test_known_values", "control/test_controller", "test_docs",
 )  # fmt: skip
 """Files that compute longest, in this order, so that no worker is left with one of them at the end."""
 

@@ -1,7 +1,5 @@
 """The design method: the paper's example, and results that the paper leaves out."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -3,8 +3,6 @@
 Search and elimination see candidates, problems and scores as from real fits; a table gives their sizes.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field, replace
 from types import SimpleNamespace

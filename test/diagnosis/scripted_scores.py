@@ -1,7 +1,5 @@
 """Models of which only the scores are given: the same residual in all blocks, so that ratios are exact."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,26 +1,12 @@
 """The criteria at their limits: scores whose ratios are exact in binary and lie exactly on a limit."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from scripted_scores import Model, model, score
 
-from rsea_ros.diagnosis.criteria import (
-    break_tie,
-    costs_priors_less,
-    is_acceptable,
-    is_at_floor,
-    is_equally_good,
-    is_far_from_floor,
-    is_nearly_as_good,
-    preference,
-    refusal,
-    verdict_of,
-    worst_ratio,
-)
+from rsea_ros.diagnosis import criteria
 from rsea_ros.diagnosis.settings import DEFAULT
 from rsea_ros.records.record import Fault
 
@@ -46,20 +32,20 @@ A, B, C = "coulomb_friction", "backlash", "hard_stop"
     ],
 )
 def test_a_gain_exactly_at_the_limit_does_not_matter(now, before, matters):
-    assert preference(now, before, rule=HALF.acceptance).matters is matters
+    assert criteria.preference(now, before, rule=HALF.acceptance).matters is matters
 
 
 def test_better_means_sure_and_large_enough_to_matter():
     for now, better in ((1.9, False), (0.9, True), (4.0, False)):
-        assert preference(score(ft=now), score(ft=2.0), rule=HALF.acceptance).better is better
-    in_half_the_blocks = preference(score(ft=1.5, spread=1.0), score(ft=1.6, spread=-1.0), 1)
+        assert criteria.preference(score(ft=now), score(ft=2.0), rule=HALF.acceptance).better is better
+    in_half_the_blocks = criteria.preference(score(ft=1.5, spread=1.0), score(ft=1.6, spread=-1.0), 1)
     assert (in_half_the_blocks.sure, in_half_the_blocks.matters) == (False, True)
 
 
 def test_models_with_as_many_parameters_pay_nothing():
     now, before = score(ft=0.9999), score(ft=1.0)  # gains 0.8 of a loss of 4000
-    assert preference(now, before).sure
-    assert not preference(now, before, 1).sure
+    assert criteria.preference(now, before).sure
+    assert not criteria.preference(now, before, 1).sure
 
 
 @pytest.mark.parametrize(
@@ -80,14 +66,14 @@ def test_models_with_as_many_parameters_pay_nothing():
     ],
 )
 def test_a_candidate_must_take_away_enough(candidate, current, reason):
-    assert refusal(candidate, current, RULE) == reason
-    assert is_acceptable(candidate, current, RULE) is (reason is None)
+    assert criteria.refusal(candidate, current, RULE) == reason
+    assert criteria.is_acceptable(candidate, current, RULE) is (reason is None)
 
 
 def test_a_model_at_the_noise_is_enough_whatever_it_gains():
     rule = replace(DEFAULT, floor=replace(DEFAULT.floor, only_noise=1.0))
-    assert refusal(model(A, ft=0.96875), model(ft=1.03125), rule) is None
-    assert refusal(model(A, ft=1.0), model(ft=1.046875), rule) == "too_small"
+    assert criteria.refusal(model(A, ft=0.96875), model(ft=1.03125), rule) is None
+    assert criteria.refusal(model(A, ft=1.0), model(ft=1.046875), rule) == "too_small"
 
 
 def test_a_cause_pays_for_its_own_parameters_alone():
@@ -95,30 +81,30 @@ def test_a_cause_pays_for_its_own_parameters_alone():
     now, before = score(samples=1.0, ft=1.2), score(samples=1.0, ft=1.5)
     gained = float((before.loss(before) - now.loss(before)).sum())
     assert 2.0 * 1 < gained < 2.0 * 13
-    assert refusal(Model(now, (A,), parameters=7), Model(before, parameters=6)) is None
+    assert criteria.refusal(Model(now, (A,), parameters=7), Model(before, parameters=6)) is None
 
 
 def test_among_equally_simple_models_loss_and_prior_count_alike():
     best = model(A, ft=1.0, prior_cost=1.5)
     other = model(B, ft=1.000125, prior_cost=1.0)  # loses 1.0 more
-    assert break_tie([other, best], score(ft=9.0)) is best
+    assert criteria.break_tie([other, best], score(ft=9.0)) is best
 
 
 @pytest.mark.parametrize(("prior_cost", "accepted"), [(1.9, "ft_bias"), (2.1, "ft_drift")])
 def test_of_models_as_simple_an_optional_unknown_is_paid_for(prior_cost, accepted):
     bias, settling = model("ft_bias", prior_cost=prior_cost, ft=1.0), model("ft_drift", parameters=8, ft=1.0)
-    assert break_tie([settling, bias], score(ft=20.0)).causes == (accepted,)
-    assert break_tie([], score(ft=20.0)) is None
+    assert criteria.break_tie([settling, bias], score(ft=20.0)).causes == (accepted,)
+    assert criteria.break_tie([], score(ft=20.0)) is None
 
 
 def test_a_larger_model_that_does_as_well_is_not_taken():
     small, large = model(A, ft=1.0, prior_cost=1.0), model(B, size=2, ft=1.0)
-    assert break_tie([large, small], score(ft=9.0)) is small
+    assert criteria.break_tie([large, small], score(ft=9.0)) is small
 
 
 def test_a_surely_worse_model_is_not_taken_near_the_floor_though_it_is_simpler():
     best, worse = model(A, size=3, ft=1.0), model(B, ft=1.5)
-    assert break_tie([worse, best], score(ft=9.0)) is best
+    assert criteria.break_tie([worse, best], score(ft=9.0)) is best
 
 
 @pytest.mark.parametrize(
@@ -132,13 +118,13 @@ def test_a_surely_worse_model_is_not_taken_near_the_floor_though_it_is_simpler()
     ],
 )
 def test_a_simpler_model_is_nearly_as_good_within_its_allowance(simpler, best, nearly):
-    assert is_nearly_as_good(simpler, best, RULE) is nearly
+    assert criteria.is_nearly_as_good(simpler, best, RULE) is nearly
 
 
 @pytest.mark.parametrize(("ratio", "equal"), [(4.0, True), (4.96875, True), (5.0, False), (40.0, False)])
 def test_models_are_equally_good_within_the_allowance(ratio, equal):
     """25/16 of the loss are a quarter more of the residual."""
-    assert is_equally_good(model(A, ft=ratio), model(B, ft=4.0), settings(room=0.5625)) is equal
+    assert criteria.is_equally_good(model(A, ft=ratio), model(B, ft=4.0), settings(room=0.5625)) is equal
 
 
 @pytest.mark.parametrize(
@@ -153,14 +139,14 @@ def test_models_are_equally_good_within_the_allowance(ratio, equal):
 )
 def test_priors_decide_between_equal_models(prior_cost, ratio, less):
     other = model(A, ft=1.0, prior_cost=2.0)
-    assert costs_priors_less(model(B, ft=ratio, prior_cost=prior_cost), other) is less
+    assert criteria.costs_priors_less(model(B, ft=ratio, prior_cost=prior_cost), other) is less
 
 
 @pytest.mark.parametrize(("ratio", "far"), [(4.96875, False), (5.0, True), (6.0, True)])
 def test_the_worst_channel_says_how_far_the_floor_is(ratio, far):
     far_model = model(ft=ratio, position=1.0)
-    assert worst_ratio(far_model) == ratio
-    assert is_far_from_floor(far_model) is far
+    assert criteria.worst_ratio(far_model) == ratio
+    assert criteria.is_far_from_floor(far_model) is far
 
 
 FINE, BAD = score(ft=1.0, position=1.0), score(ft=1.0, position=9.0)
@@ -186,7 +172,7 @@ LOST = Fault("frozen_samples", "ft", 0.1)
     ],
 )
 def test_the_verdict_follows_from_scores_statuses_and_faults(scores, statuses, faults, verdict):
-    assert verdict_of(scores, statuses, faults=faults) == verdict
+    assert criteria.verdict_of(scores, statuses, faults=faults) == verdict
 
 
 @pytest.mark.parametrize(
@@ -198,7 +184,7 @@ def test_the_verdict_follows_from_scores_statuses_and_faults(scores, statuses, f
     ],
 )
 def test_every_channel_must_reach_the_floor(ratios, reached):
-    assert is_at_floor(score(**ratios), replace(DEFAULT.floor, reached=1.0)) is reached
+    assert criteria.is_at_floor(score(**ratios), replace(DEFAULT.floor, reached=1.0)) is reached
 
 
 def test_every_setting_has_meaning_unit_and_reason_and_its_curve_on_the_page_that_it_points_to():

@@ -1,7 +1,5 @@
 """Backward elimination and its rivals as tables: residuals of models in; causes and reasons out."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -177,9 +175,7 @@ def test_models_nest_from_the_most_useful_cause_on(world):
     scripted_run = world(script(ratios))
     full = scripted_run.fits.candidate(GAP, FRICTION, DELAY)
     nested = nested_sequence(Selection((scripted_run.fits.candidate(), full)), scripted_run.models)
-    assert [m.causes for m in nested.models] == [
-        (), (FRICTION,), (FRICTION, DELAY), (FRICTION, DELAY, GAP)
-    ]  # fmt: skip
+    assert [m.causes for m in nested.models] == [(), (FRICTION,), (FRICTION, DELAY), (FRICTION, DELAY, GAP)]
     assert [m.validation.ratio("ft") for m in nested.models] == [9.0, 6.0, 2.0, 1.0]
 
 

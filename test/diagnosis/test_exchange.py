@@ -2,17 +2,16 @@
 
 import numpy as np
 import pytest
+from runs import RATE, RIG
 
+from rsea_ros import simulate
 from rsea_ros.diagnosis.backward_elimination import in_exchange
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.identification.fit import add_effect, unknowns_of
 from rsea_ros.identification.problem import Problem, case_from
 from rsea_ros.identification.solver import solve
 from rsea_ros.identification.unknowns import start_vector
-from rsea_ros.model.rig import EffectSetting
-from rsea_ros.model.rig_file import load_rig
-from rsea_ros.model.simulation import synthesize
-from rsea_ros.records.record import MEASURED, Channel
+from rsea_ros.records.record import MEASURED
 
 
 @pytest.mark.parametrize(
@@ -21,9 +20,9 @@ from rsea_ros.records.record import MEASURED, Channel
 )
 def test_between_two_scales_of_the_torque_the_rest_changes_with_them(hidden, found):
     """From elsewhere the fit of the right one stopped in a valley, and the wrong one was `confirmed`."""
-    rig, t = load_rig("paper_high_impedance"), np.arange(2240) / 280.0
-    command = Channel(t, 20.0 * np.sin(2.0 * np.pi * (0.3 + 1.5 * t) * t))
-    record = synthesize(rig.with_effects(EffectSetting(hidden, {"gain": 1.1})), command, seed=1)
+    rig, t = RIG, np.arange(2240) / RATE
+    command = 20.0 * np.sin(2.0 * np.pi * (0.3 + 1.5 * t) * t)
+    record = simulate(rig.with_effect(hidden, gain=1.1), command, RATE, seed=1)
     case = case_from(record, rig)
     unknowns = tuple(u for u in unknowns_of(rig, (case,)) if not u.is_clock)
     nominal = Problem((case,), rig, unknowns, MEASURED)

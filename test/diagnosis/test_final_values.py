@@ -1,18 +1,15 @@
 """What the data determine is said of the values together with the causes, not of those before them."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
 import pytest
+from runs import RATE, trying
 
 import rsea_ros as rsea
-from rsea_ros.diagnosis.settings import DiagnosisSettings
-from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.report.diagnosis.page import diagnosis_json
 
-RATE, SECONDS = 280.0, 8.0
+SECONDS = 8.0
 TEMPLATE = Path(__file__).resolve().parents[2] / "config" / "templates" / "rig.yaml"
 
 
@@ -24,8 +21,7 @@ def diagnosed():
     chirp = np.sin(2.0 * np.pi * (0.2 * t + 29.8 / (2.0 * SECONDS) * t**2))
     command = 10.0 * chirp + 2.0 * np.random.default_rng(0).standard_normal(len(t))
     true = rig.with_values({"chassis.inertia": 4e-3}).with_effect("backlash", gap=6e-3)
-    tried = ("backlash", "hard_stop", "coulomb_friction", "command_delay", "torque_constant_error")
-    settings = DiagnosisSettings(without=tuple(n for n in catalogue() if n not in tried))
+    settings = trying("backlash", "coulomb_friction")
     return rsea.diagnose(rsea.simulate(true, command, RATE), rig, settings=settings)
 
 
@@ -43,9 +39,6 @@ def test_a_value_that_only_the_extended_model_determines_is_called_determined(di
     assert (before.determined, after.determined) == ("no", "yes")
     assert after.value == pytest.approx(4e-3, rel=0.02)
     assert "not identifiable" not in diagnosed.summary()
-
-
-def test_the_document_has_the_values_together_with_the_causes(diagnosed):
     document = diagnosis_json(diagnosed.result)
     final = document["extended"]["parameters"]["chassis.inertia"]
     assert final["told_by_data"] > 0.9 > document["baseline"]["parameters"]["chassis.inertia"]["told_by_data"]

@@ -1,11 +1,9 @@
 """Which data count how much: a held-out record or test blocks, and each of several runs by itself."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
-import numpy as np
 import pytest
+from runs import RIG, excited, only
 
 from rsea_ros.checks.faults import check
 from rsea_ros.diagnosis.candidate import FitSetup, fit_candidate, refit, with_noise_reestimated
@@ -13,22 +11,14 @@ from rsea_ros.diagnosis.diagnose import diagnose, nominal_problem
 from rsea_ros.diagnosis.evaluation import HeldOut, fitted_noise
 from rsea_ros.diagnosis.settings import DEFAULT
 from rsea_ros.errors import IdentificationError
-from rsea_ros.identification.excitation import ExcitationSettings, chirp, excitation
-from rsea_ros.identification.unknowns import start_vector, with_effect
-from rsea_ros.model.rig_file import load_rig
-from rsea_ros.model.simulation import synthesize
-from rsea_ros.records.record import Channel
-
-RIG = load_rig("paper_high_impedance")
+from rsea_ros.identification.unknowns import start_vector
 
 
 def record_of(stiffer=1.0, seed=1, channels=None):
     """Return a short record of the rig with its stiffness times a factor. channels: all by default."""
     bench = RIG.with_values({"spring.stiffness": stiffer * RIG["spring.stiffness"]})
-    u = excitation("chirp", ExcitationSettings(rate=280.0, duration=8.0))
-    record = synthesize(bench, Channel(np.arange(len(u)) / 280.0, u), seed=seed)
-    kept = channels and {n: record[n] for n in ("command", *channels)}
-    return record if channels is None else replace(record, channels=kept)
+    record = excited(bench, "chirp", sensors=seed, duration=8.0)
+    return record if channels is None else only(record, *channels)
 
 
 def checked_record(*args, **more):
@@ -69,19 +59,6 @@ def test_a_held_out_record_without_a_fitted_channel_is_refused():
         diagnose([fitted], RIG, other)
 
 
-RATE = 280.0
-GAP = {"gap": 4e-3}
-
-
-def record(amplitude, seed, **effects):
-    """A chirp on the rig with some effects that its model lacks."""
-    asked = ExcitationSettings(rate=RATE, duration=24.0, amplitude=amplitude, noise=0.0, low=0.2, high=30.0)
-    command, rig = chirp(asked), RIG
-    for name, parameters in effects.items():
-        rig = with_effect(rig, name, parameters)
-    return synthesize(rig, Channel(np.arange(len(command)) / RATE, command), seed=seed)
-
-
 def error_of_stiffness(model, setup, unit):
     """Fit again as often as causes would be added; return the relative error of the spring's stiffness."""
     for _ in range(4):
@@ -90,8 +67,10 @@ def error_of_stiffness(model, setup, unit):
 
 
 def test_a_run_with_play_hardly_spoils_the_values_that_another_shows():
-    records = [record(10.0, 1), record(8.0, 11, backlash=GAP)]
-    nominal = nominal_problem([check(r, RIG) for r in records], RIG)
+    asked = {"duration": 24.0, "noise": 0.0, "low": 0.2, "high": 30.0}
+    sound = excited(RIG, "chirp", sensors=1, amplitude=10.0, **asked)
+    worn = excited(RIG.with_effect("backlash", gap=4e-3), "chirp", sensors=11, amplitude=8.0, **asked)
+    nominal = nominal_problem([check(r, RIG) for r in (sound, worn)], RIG)
     setup = FitSetup(nominal.cases, DEFAULT)
     model = with_noise_reestimated(fit_candidate(setup, nominal))
     in_units_of_both = error_of_stiffness(model, setup, lambda score: replace(score, run=None))

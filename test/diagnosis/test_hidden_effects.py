@@ -5,41 +5,29 @@ both. One record of each kind, the shortest that decides; `bench diagnosis` play
 severity, pairs, and effects that the catalogue lacks.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from independent.bench import drawn_bench, record_command, record_run
-from independent.excitations import RATE
 from independent.hidden import MAIN_PARAMETER, hide
 from independent.puzzle import DELAY, RESONANCE, delayed_record, noisy_resonance
 from independent.severities import drawn_parameters
+from runs import RATE, RIG, excited, trying
 
-import rsea_ros as rsea
 from rsea_ros.diagnosis.diagnose import diagnose
-from rsea_ros.diagnosis.settings import DiagnosisSettings
-from rsea_ros.effects.catalogue import catalogue, effect_named
-from rsea_ros.identification.excitation import ExcitationSettings, chirp, excitation
+from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.model.prediction_errors import predict
-from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.model.simulation import synthesize
 from rsea_ros.records.record import Channel, Record
 from rsea_ros.report.remark_words import remark_sentences
 
-RIG = load_rig("paper_high_impedance")
-SWEEP = {"duration": 10.0, "low": 0.2, "high": 30.0}
+pytestmark = pytest.mark.usefixtures("brief_next_run")
+SWEEP = {"duration": 10.0, "noise": 0.0, "low": 0.2, "high": 30.0}
 
 
-def only(*names):
-    """Settings that try these effects alone."""
-    return DiagnosisSettings(without=tuple(n for n in catalogue() if n not in names))
-
-
-def slow_sweep(duration=20.0):
-    """Return a sine of 30 N m from 0.1 to 10 Hz."""
-    t = np.arange(round(duration * RATE)) / RATE
-    growth = np.log(100.0) / duration
+def slow_sweep():
+    """Return a sine of 30 N m from 0.1 to 10 Hz in 20 s."""
+    t = np.arange(round(20.0 * RATE)) / RATE
+    growth = np.log(100.0) / 20.0
     return 30.0 * np.sin(2.0 * np.pi * 0.1 * np.expm1(growth * t) / growth)
 
 
@@ -49,7 +37,7 @@ def test_the_hidden_effect_is_found_with_its_size_and_its_gain():
     bench = hide(drawn_bench(rng), "backlash", parameters)
     record, fresh = (record_run(bench, 38000 + k, "multisine", 6.0) for k in (1, 2))
     alike = effect_named("backlash").claims.confusable_with
-    diagnosis = diagnose([record], RIG, settings=only("backlash", "coulomb_friction", *alike))
+    diagnosis = diagnose([record], RIG, settings=trying("backlash", "coulomb_friction", *alike))
     (cause,) = diagnosis.causes
     assert cause.name == "backlash"
     assert cause.parameters["gap"].value == pytest.approx(parameters["gap"], rel=0.1)
@@ -64,13 +52,10 @@ def test_an_effect_outside_the_catalogue_gets_no_name():
     """The hidden effect and all that look like it are not tried: then nothing of the rest is named."""
     effect, mode = "structural_resonance", {"frequency": 43.4, "damping_ratio": 0.032, "participation": 0.24}
     record = record_run(hide(drawn_bench(np.random.default_rng(36)), effect, mode), 36001, "multisine", 6.0)
-    tried = only(
-        "backlash", "coulomb_friction", "command_delay", "nonlinear_spring", "spring_hysteresis", "ft_drift",
-        "torque_constant_error", "quadratic_drag",
-    )  # fmt: skip
-    named = set(catalogue()) - set(tried.without)
-    assert not any(effect in effect_named(n).claims.confusable_with for n in named)
-    diagnosis = diagnose([record], RIG, settings=tried)
+    tried = ("backlash", "coulomb_friction", "command_delay", "nonlinear_spring", "spring_hysteresis",
+             "ft_drift", "torque_constant_error", "quadratic_drag")  # fmt: skip
+    assert not any(effect in effect_named(n).claims.confusable_with for n in tried)
+    diagnosis = diagnose([record], RIG, settings=trying(*tried))
     assert (diagnosis.verdict, diagnosis.causes) == ("unexplained", ())
 
 
@@ -83,7 +68,7 @@ def test_both_of_two_causes_are_found_with_their_sizes():
         bench = hide(bench, effect, parameters)
         sizes[effect] = parameters[MAIN_PARAMETER[effect]]
     alike = {other for effect in sizes for other in effect_named(effect).claims.confusable_with}
-    tried = only(*sizes, *alike, "backlash", "coulomb_friction")
+    tried = trying(*sizes, *alike, "backlash", "coulomb_friction")
     diagnosis = diagnose([record_run(bench, 2, "multisine", 6.0)], RIG, settings=tried)
     assert diagnosis.verdict == "explained"
     values = {c.name: c.parameters[MAIN_PARAMETER[c.name]].value for c in diagnosis.causes}
@@ -97,7 +82,7 @@ def test_a_sensor_that_is_read_late_is_no_fault_of_the_bench(effect, channels):
     """Nor a filter of the sensor, nor a mode: all of them were named for one that was 2 to 8 ms late."""
     record = record_run(drawn_bench(np.random.default_rng(7)), 7001, "multisine", 6.0)
     late = {n: Channel(record[n].t + 4e-3, record[n].y) for n in channels}
-    tried = only(
+    tried = trying(
         "ft_delay", "encoder_delay", "command_delay", "ft_sensor_lag", "base_compliance", "coulomb_friction"
     )
     (cause,) = diagnose([Record({**record.channels, **late}, "late")], RIG, settings=tried).causes
@@ -111,8 +96,8 @@ def test_strong_cogging_is_named_with_its_size():
     """A free simulation left 120 times the noise: a 502:1 gear settles in other detents than the real one."""
     amplitude, cycles, rng = 4.0, 8.0, np.random.default_rng(2)
     ripple = {"amplitude": amplitude, "cycles_per_revolution": cycles, "phase": float(rng.uniform(-3.0, 3.0))}
-    record = record_run(hide(drawn_bench(rng), "torque_ripple", ripple), 2001, "chirp_noise", 6.0)
-    diagnosis = diagnose([record], RIG, settings=only("torque_ripple", "backlash"))
+    record = record_run(hide(drawn_bench(rng), "torque_ripple", ripple), 2001, "chirp_noise", 5.0)
+    diagnosis = diagnose([record], RIG, settings=trying("torque_ripple", "backlash"))
     assert diagnosis.causes[0].name == "torque_ripple"
     sizes = diagnosis.causes[0].parameters
     assert sizes["amplitude"].value == pytest.approx(amplitude, rel=0.02)
@@ -123,7 +108,7 @@ def test_strong_cogging_is_named_with_its_size():
 
 def test_a_resonance_is_found_in_the_noise_and_what_the_noise_hides_is_said():
     """The paper's own puzzle (section 3.2.2): out of sync at 19 Hz, a bump at 33 Hz."""
-    tried = only("structural_resonance", "command_delay")  # which turns the phase as much at 19 Hz
+    tried = trying("structural_resonance", "command_delay")  # which turns the phase as much at 19 Hz
     diagnosis = diagnose([noisy_resonance(3, 100.0)], load_rig("paper_moving_output"), settings=tried)
     assert [cause.name for cause in diagnosis.causes] == ["structural_resonance"]
     for name in ("frequency", "participation"):
@@ -134,7 +119,7 @@ def test_a_resonance_is_found_in_the_noise_and_what_the_noise_hides_is_said():
 
 
 def test_a_delay_of_one_and_a_half_samples_is_no_resonance():
-    tried = only("command_delay", "structural_resonance", "current_loop_lag")
+    tried = trying("command_delay", "structural_resonance", "current_loop_lag")
     diagnosis = diagnose([delayed_record(3, 6.0)], load_rig("paper_moving_output"), settings=tried)
     assert [cause.name for cause in diagnosis.causes] == ["command_delay"]
     assert diagnosis.causes[0].parameters["delay"].value == pytest.approx(DELAY, rel=0.02)
@@ -147,7 +132,7 @@ def test_a_mode_above_the_band_is_told_from_a_base_that_moves():
     assert parameters["frequency"] > 60.0
     bench = hide(drawn_bench(rng), "structural_resonance", parameters)
     record = record_command(bench, slow_sweep(), rng)
-    settings = only("structural_resonance", "base_compliance")
+    settings = trying("structural_resonance", "base_compliance")
     (cause,) = diagnose([record], RIG, settings=settings).causes
     assert (cause.name, cause.status) == ("structural_resonance", "confirmed")
 
@@ -165,7 +150,7 @@ def test_a_mode_above_the_band_is_told_from_a_base_that_moves():
 def test_a_poor_first_guess_does_not_lose_the_effect(name, parameters, beside):
     rng = np.random.default_rng(5)
     record = record_command(hide(drawn_bench(rng), name, parameters), slow_sweep(), rng)
-    diagnosis = diagnose([record], RIG, settings=only(name, *beside))
+    diagnosis = diagnose([record], RIG, settings=trying(name, *beside))
     assert [cause.name for cause in diagnosis.causes] == [name]
     assert diagnosis.verdict == "explained"
 
@@ -173,7 +158,7 @@ def test_a_poor_first_guess_does_not_lose_the_effect(name, parameters, beside):
 def diagnose_bench(tried, **hidden):
     """Return the diagnosis of a drawn bench with values of its own, by some effects of the catalogue."""
     bench = drawn_bench(np.random.default_rng(3)).with_values(**hidden)
-    return diagnose([record_run(bench, 5, "chirp_noise", 10.0)], RIG, settings=only(*tried))
+    return diagnose([record_run(bench, 5, "chirp_noise", 10.0)], RIG, settings=trying(*tried))
 
 
 def test_a_right_cause_is_named_beside_a_law_that_the_catalogue_lacks():
@@ -199,11 +184,9 @@ def test_stribeck_for_coulomb_friction_with_quadratic_drag_is_not_confirmed():
 
 def test_a_dead_zone_that_does_not_jump_has_its_width():
     """The jump was seen from one side only, where nothing was wrong: 0.14 [0.139, 0.142] N m for 0.08."""
-    rig, hidden = load_rig("paper_high_impedance"), {"width": 2.0, "jump": 0.0}
-    command = chirp(ExcitationSettings(rate=RATE, amplitude=15.0, noise=0.0, **SWEEP))
-    true = rig.with_effects(EffectSetting("dead_zone", hidden))
-    record = synthesize(true, Channel(np.arange(len(command)) / RATE, command), seed=1)
-    (cause,) = diagnose([record], rig, settings=only("dead_zone")).causes
+    hidden = {"width": 2.0, "jump": 0.0}
+    record = excited(RIG.with_effect("dead_zone", **hidden), "chirp", sensors=1, amplitude=15.0, **SWEEP)
+    (cause,) = diagnose([record], RIG, settings=trying("dead_zone")).causes
     assert cause.status == "confirmed"
     for name, value in hidden.items():
         low, high = cause.parameters[name].ci95
@@ -214,10 +197,9 @@ def test_a_dead_zone_that_does_not_jump_has_its_width():
 def test_friction_that_lets_a_gear_rest_is_confirmed_and_no_larger_law_doubts_it():
     """It was `leading`, its creep at its bound, and `one_of` beside Stribeck's law without its own part."""
     rig, torque = load_rig("paper_moving_output"), 4.0
-    command = chirp(ExcitationSettings(rate=RATE, amplitude=60.0, noise=0.0, **SWEEP))
-    hidden = EffectSetting("coulomb_friction", {"torque": torque, "creep_velocity": 1e-7})
-    record = synthesize(rig.with_effects(hidden), Channel(np.arange(len(command)) / RATE, command), seed=1)
-    found = diagnose([record], rig, settings=only("coulomb_friction", "stribeck_friction"))
+    true = rig.with_effect("coulomb_friction", torque=torque, creep_velocity=1e-7)
+    record = excited(true, "chirp", sensors=1, amplitude=60.0, **SWEEP)
+    found = diagnose([record], rig, settings=trying("coulomb_friction", "stribeck_friction"))
     assert [(c.name, c.status) for c in found.causes] == [("coulomb_friction", "confirmed")]
     assert found.alternatives == ()
     assert found.causes[0].parameters["torque"].value == pytest.approx(torque, rel=1e-3)
@@ -225,8 +207,8 @@ def test_friction_that_lets_a_gear_rest_is_confirmed_and_no_larger_law_doubts_it
 
 def test_a_lag_beside_the_clocks_is_no_delay():
     """In a logarithm a lag has a plateau at nothing: from the clock's bound the fit went there and stayed."""
-    command = excitation("chirp", ExcitationSettings(duration=60.0))
-    record = rsea.simulate(RIG.with_effect("ft_sensor_lag", time_constant=1.5e-3), command, RATE, seed=17)
-    (cause,) = diagnose([record], RIG, settings=only("ft_sensor_lag", "ft_delay", "base_compliance")).causes
+    late = RIG.with_effect("ft_sensor_lag", time_constant=1.5e-3)
+    record = excited(late, "chirp", sensors=3, duration=15.0, amplitude=40.0, noise=20.0)
+    (cause,) = diagnose([record], RIG, settings=trying("ft_sensor_lag", "ft_delay", "base_compliance")).causes
     low, high = cause.parameters["time_constant"].ci95
     assert cause.name == "ft_sensor_lag" and low < 1.5e-3 < high

@@ -1,7 +1,5 @@
 """Where fits begin: lines, ripples, gains and limits that are put into signals are found in them."""
 
-from __future__ import annotations
-
 import math
 from types import SimpleNamespace
 

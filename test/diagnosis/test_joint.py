@@ -1,32 +1,29 @@
 """A joint commanded by positions: its causes are found from its log."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from runs import trying
 
+from rsea_ros import simulate
 from rsea_ros.diagnosis.diagnose import diagnose
-from rsea_ros.diagnosis.settings import DiagnosisSettings
-from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.identification.excitation import JOINT, excitation
-from rsea_ros.model.rig import Quantity, Rig
+from rsea_ros.model.rig import Quantity
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.model.simulation import synthesize
 from rsea_ros.records.record import Channel, Record
 from rsea_ros.report.remark_words import remark_sentences
 
+pytestmark = pytest.mark.usefixtures("brief_next_run")
 TRIED = ("coulomb_friction", "command_delay", "backlash", "stribeck_friction", "current_loop_lag")
-SETTINGS = DiagnosisSettings(max_causes=2, without=tuple(n for n in catalogue() if n not in TRIED))
+SETTINGS = trying(*TRIED, max_causes=2)
 
 
-def log_joint(rig: Rig, high: float = 3.0) -> Record:
-    """Return 8 s of a joint whose inertia, damping and gravity are not those of its rig."""
-    targets = excitation("chirp", replace(JOINT, duration=6.0, high=high))
+def log_joint(rig):
+    """Return 6 s of a joint whose inertia, damping and gravity are not those of its rig."""
+    targets = excitation("chirp", replace(JOINT, duration=6.0, high=3.0))
     off = {"rotor.reflected_inertia": 0.026, "rotor.reflected_damping": 0.35, "spring_end.gravity": 0.6}
-    stamps = np.arange(len(targets)) / JOINT.rate
-    return synthesize(rig.with_values(off), Channel(stamps, targets), seed=6)
+    return simulate(rig.with_values(off), targets, JOINT.rate, seed=6)
 
 
 def test_friction_and_a_delay_of_the_targets_are_named():
@@ -41,18 +38,18 @@ def test_friction_and_a_delay_of_the_targets_are_named():
     assert any("cannot determine the play in the gear" in s for s in remark_sentences(diagnosis.remarks))
 
 
-def log_frames(own: bool | None = None) -> Record:
-    """Return 8 s of a joint with friction that follows MIT frames at 200 Hz, firmware at 1 kHz, by RK2.
+def log_frames(own=None):
+    """Return 6 s of a joint with friction that follows MIT frames at 200 Hz, firmware at 1 kHz, by RK2.
 
     own: its motor torque is logged, that of the same frame or of the one before.
     """
-    t = 0.005 * np.arange(1600)
+    t = 0.005 * np.arange(1200)
     w = 2.0 * np.pi * np.array([[0.4], [2.1], [7.0]])
     sizes = np.array([[0.5], [0.2], [0.05]])
     angles, rates = (sizes * np.sin(w * t)).sum(0), (sizes * w * np.cos(w * t)).sum(0)
     torques = 1.2 * np.sin(2.0 * np.pi * 3.3 * t) * np.exp(np.sin(t))
 
-    def acceleration(speed: float) -> float:
+    def acceleration(speed):
         return (u - 0.2 * speed - 0.15 * np.tanh(speed / 2e-3)) / 0.038
 
     u, q, v, h, shown, held = 0.0, 0.0, 0.0, 2e-4, [], []
@@ -75,8 +72,7 @@ def log_frames(own: bool | None = None) -> Record:
 
 
 def test_friction_of_a_joint_that_follows_mit_frames_is_named_with_its_size():
-    rig = rigid(load_rig("pd_joint"), "mit", k_p=30.0, k_d=0.8)
-    found = diagnose([log_frames()], rig, settings=replace(SETTINGS, max_causes=1))
+    found = diagnose([log_frames()], mit_joint(), settings=replace(SETTINGS, max_causes=1))
     (cause,) = found.causes
     low, high = cause.parameters["torque"].ci95
     assert (found.verdict, cause.name, cause.status) == ("explained", "coulomb_friction", "confirmed")
@@ -87,20 +83,20 @@ def test_friction_of_a_joint_that_follows_mit_frames_is_named_with_its_size():
 def test_a_log_with_the_torque_of_its_own_frame_has_no_other_cause(own):
     """It was an encoder that is read a tick late, `confirmed`, or an overshoot of the current."""
     tried = {*TRIED, "encoder_delay", "current_loop_overshoot"} - {"backlash", "stribeck_friction"}
-    settings = DiagnosisSettings(without=tuple(n for n in catalogue() if n not in tried))
-    rig = rigid(load_rig("pd_joint"), "mit", k_p=30.0, k_d=0.8)
-    found = diagnose([log_frames(own)], rig, settings=settings)
+    found = diagnose([log_frames(own)], mit_joint(), settings=trying(*tried))
     assert [(c.name, c.status) for c in found.causes] == [("coulomb_friction", "confirmed")]
     (clock,) = (p.value for p in found.extended if p.name == "clock.motor_torque")
     assert (clock > 0.4e-3) is own
 
 
-def rigid(rig: Rig, kind: str, **gains: float) -> Rig:
-    """Return a rig without spring and gravity, in another kind of loop."""
+def mit_joint():
+    """Return a joint without spring and gravity that follows MIT frames."""
+    rig = load_rig("pd_joint")
     values = {n: q for n, q in rig.quantities.items() if n.split(".")[0] not in ("spring", "controller")}
-    values |= {f"controller.{n}": Quantity(v) for n, v in (gains | {"sample_time": 1e-3}).items()}
+    gains = {"k_p": 30.0, "k_d": 0.8, "sample_time": 1e-3}
+    values |= {f"controller.{n}": Quantity(v) for n, v in gains.items()}
     values |= {"spring_end.gravity": Quantity(0.0), "rotor.reflected_inertia": Quantity(0.03, 0.5)}
-    return replace(rig, quantities=values, rigid_spring=True, loop=kind)
+    return replace(rig, quantities=values, rigid_spring=True, loop="mit")
 
 
 def test_a_joint_with_other_values_has_no_cause():

@@ -1,24 +1,21 @@
-"""What a model pays for values outside the doubt that the rig states, against what it gains."""
-
-from __future__ import annotations
+"""What a model pays for values outside the doubt that the rig states, and fits that begin at these values."""
 
 import numpy as np
 import pytest
+from runs import RIG, excited, only, trying
 from scripted_scores import model
 
-from rsea_ros.diagnosis import next_experiment
 from rsea_ros.diagnosis.criteria import break_tie, refusal
 from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.diagnosis.score import likelier_by
-from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings
-from rsea_ros.effects.catalogue import catalogue
-from rsea_ros.identification.excitation import ExcitationSettings, chirp
-from rsea_ros.identification.unknowns import Unknown, with_effect
+from rsea_ros.diagnosis.settings import DEFAULT
+from rsea_ros.identification.unknowns import Unknown
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.model.simulation import synthesize
-from rsea_ros.records.record import Channel, Record
+from rsea_ros.records.record import Channel
 
+pytestmark = pytest.mark.usefixtures("brief_next_run")
 FRICTION, GAP, STOP = "coulomb_friction", "backlash", "hard_stop"
+ASKED = {"amplitude": 15.0, "noise": 0.3, "low": 0.1, "high": 60.0}
 GAIN = 40 * 100 * (1.0 - 0.25)
 """Twice the log of the odds that half of the residual is worth: 40 blocks of 100 samples of white noise."""
 
@@ -64,38 +61,76 @@ def test_a_wide_doubt_concerns_the_order_of_magnitude(spread, value, sigmas):
 def test_a_rig_that_is_wrong_decides_between_no_two_causes():
     """A wrong motor constant and a wrong gain differ by the rig's values alone, and one of these is off."""
     name, value, cause, rival = "spring.stiffness", 1.6, "ft_gain_error", "torque_constant_error"
-    stated = load_rig("paper_high_impedance")
-    truth = with_effect(stated.with_values({name: value * stated[name]}), cause, {"gain": 0.88})
-    asked = ExcitationSettings(rate=280.0, duration=12.0, amplitude=15.0, noise=0.3, low=0.1, high=60.0)
-    command = chirp(asked)
-    record = synthesize(truth, Channel(np.arange(len(command)) / 280.0, command), seed=7)
-    tried = {cause, rival, "current_loop_lag", "coulomb_friction"}
-    found = diagnose([record], stated, settings=DiagnosisSettings(without=frozenset(catalogue()) - tried))
+    truth = RIG.with_values({name: value * RIG[name]}).with_effect(cause, gain=0.88)
+    record = excited(truth, "chirp", sensors=7, duration=12.0, **ASKED)
+    found = diagnose([record], RIG, settings=trying(cause, rival, "current_loop_lag", "coulomb_friction"))
     (named,) = found.causes
     assert named.status == "one_of"
     assert {named.name, *(a.name for a in found.alternatives)} == {cause, rival}
 
 
-def test_what_came_later_does_not_decide_between_two_causes_either(monkeypatch):
+def test_what_came_later_does_not_decide_between_two_causes_either():
     """Beside friction and an F/T sensor 6 ms late it was "confirmed" at 0.93, the F/T's gain at 0.07.
 
     The two were weighed beside the model of their step, which lacked the delay. The stated stiffness (5 %)
     hardly tells a torque constant of 0.94 from a gain.
     """
-    stated = load_rig("paper_high_impedance")
-    rubs = with_effect(stated, "coulomb_friction", {"torque": 2.0})
-    truth = with_effect(rubs, "torque_constant_error", {"gain": 0.94})
-    asked = ExcitationSettings(rate=280.0, duration=6.0, amplitude=15.0, noise=0.3, low=0.1, high=60.0)
-    command = chirp(asked)
-    run = synthesize(truth, Channel(np.arange(len(command)) / 280.0, command), seed=7)
-    late = Channel(run["ft"].t + 6e-3, run["ft"].y)
-    record = Record({"command": run["command"], "position": run["position"], "ft": late}, "late")
-    tried = {"torque_constant_error", "ft_gain_error", "ft_delay", "ft_sensor_lag", "coulomb_friction"}
-    monkeypatch.setattr(next_experiment, "_LENGTH", 4.0)  # of the run that would decide: not asked for here
-    settings = DiagnosisSettings(without=frozenset(catalogue()) - tried)
-    found = diagnose([record], stated, settings=settings)
+    truth = RIG.with_effect("coulomb_friction", torque=2.0).with_effect("torque_constant_error", gain=0.94)
+    run = only(excited(truth, "chirp", sensors=7, duration=6.0, **ASKED), "position", "ft")
+    record = run.with_channels(ft=Channel(run["ft"].t + 6e-3, run["ft"].y))
+    tried = ("torque_constant_error", "ft_gain_error", "ft_delay", "ft_sensor_lag", "coulomb_friction")
+    found = diagnose([record], RIG, settings=trying(*tried))
     status = {c.name: c.status for c in found.causes}
     assert status == {
         "coulomb_friction": "confirmed", "ft_delay": "confirmed", "torque_constant_error": "one_of"
     }  # fmt: skip
     assert [a.name for a in found.alternatives] == ["ft_gain_error"]
+
+
+LAG, DELAY = "current_loop_lag", "command_delay"
+SETTINGS = trying(LAG, DELAY, "current_loop_overshoot")
+SEA = load_rig("sea_two_encoders")
+INERTIA = "rotor.reflected_inertia"
+
+
+def torque_chirp_of(values, effects, seed=3, seconds=7.0):
+    """Return a record of a locked actuator with a spring encoder, without motor current."""
+    rig = SEA.with_values(values)
+    for name, parameters in effects.items():
+        rig = rig.with_effect(name, **parameters)
+    asked = {"duration": seconds, "amplitude": 5.0, "noise": 0.0, "low": 0.1, "high": 40.0}
+    return only(excited(rig, "chirp", sensors=seed, **asked), "ft", "deflection")
+
+
+def test_a_slow_lag_of_the_current_is_named_and_not_what_fits_far_from_the_rig():
+    """It looks like a damping of the rotor: a fit without it leaves the rig, and one from there stays."""
+    truth = {INERTIA: 0.013, "rotor.reflected_damping": 5.0}
+    record = torque_chirp_of(truth, {LAG: {"time_constant": 0.034}})
+    found = diagnose([record], SEA, settings=SETTINGS)
+    assert [(c.name, c.status) for c in found.causes] == [(LAG, "confirmed")]
+    (extended,) = (p for p in found.extended if p.name == INERTIA)
+    assert extended.value == pytest.approx(truth[INERTIA], rel=0.1)
+
+
+def test_two_effects_are_named_where_one_fits_as_well_only_far_from_the_rig():
+    effects = {LAG: {"time_constant": 0.02}, DELAY: {"delay": 4e-3}}
+    record = torque_chirp_of({INERTIA: 0.011, "rotor.reflected_damping": 10.0}, effects, seconds=10.0)
+    found = diagnose([record], SEA, settings=SETTINGS)
+    assert {(c.name, c.status) for c in found.causes} == {(LAG, "confirmed"), (DELAY, "confirmed")}
+    sizes = {n: p.value for c in found.causes for n, p in c.parameters.items()}
+    assert sizes["time_constant"] == pytest.approx(0.02, rel=0.02)
+    assert sizes["delay"] == pytest.approx(4e-3, abs=3e-4)
+
+
+def test_a_cause_is_named_on_a_bench_whose_inertia_is_five_times_the_stated_one():
+    """Truth far from the rig: the stated values are where fits may begin, not where they must end."""
+    record = torque_chirp_of({INERTIA: 0.05}, {DELAY: {"delay": 8e-3}}, 5)
+    found = diagnose([record], SEA, settings=SETTINGS)
+    assert [(c.name, c.status) for c in found.causes] == [(DELAY, "confirmed")]
+    assert [r.code for r in found.remarks if r.code == "off_rig"]
+
+
+@pytest.mark.parametrize(("away", "chosen"), [(1.0, "one"), (40.0, "two")])
+def test_of_equal_models_the_simpler_is_chosen_unless_it_leaves_known_values_far_behind(away, chosen):
+    one, two = model(LAG, ft=1.0, prior_cost=away), model(LAG, DELAY, size=2, ft=1.0, prior_cost=0.5)
+    assert break_tie([one, two], model(ft=20.0).validation) is {"one": one, "two": two}[chosen]

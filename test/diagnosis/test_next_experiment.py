@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from runs import RATE, RIG, command_of, excited
 
 from rsea_ros.diagnosis.next_experiment import (
     EXCITATIONS,
@@ -19,13 +20,12 @@ from rsea_ros.identification.solver import Solution
 from rsea_ros.model.drive import Drive
 from rsea_ros.model.rig import END_NAMES, EffectSetting
 from rsea_ros.model.rig_file import load_rig, packaged_names
-from rsea_ros.model.simulation import simulate, synthesize
+from rsea_ros.model.simulation import simulate
 from rsea_ros.nodes import driver
 from rsea_ros.nodes._devices import limits_of
 from rsea_ros.nodes.excite import TABLE
 from rsea_ros.records.record import Channel, Record
 
-RATE = 280.0
 DEFAULTS = {p.name: p.default for p in driver.TABLE}
 EVERY = {f"{o.kind} {o.low:g}-{o.high:g} Hz": (o.kind, _settings(o, RATE)) for o in EXCITATIONS}
 CAUSES = {"backlash": {"gap": 3e-3}, "coulomb_friction": {"torque": 0.4}}
@@ -38,11 +38,12 @@ PAIRS = [
 ]
 
 
+SLOW = {"kind": "chirp", "duration": 10.0, "noise": 0.0, "low": 0.1, "high": 5.0}
+
+
 def like(rig, amplitude=20.0):
     """A case of a run as the bench has it."""
-    slow = ExcitationSettings(rate=RATE, duration=10.0, amplitude=amplitude, noise=0.0, low=0.1, high=5.0)
-    command = excitation("chirp", slow)
-    return case_from(synthesize(rig, Channel(np.arange(len(command)) / RATE, command), seed=1), rig)
+    return case_from(excited(rig, sensors=1, amplitude=amplitude, **SLOW), rig)
 
 
 def play_run(run, rig):
@@ -79,11 +80,9 @@ def shares(rig, command, travel):
 def present(rig):
     """Return the case of a run within the limits: as large as they let a slow chirp be."""
     amplitude = 0.3 if rig.loop is not None else 40.0
-    while True:
-        slow = ExcitationSettings(rate=RATE, duration=10.0, amplitude=amplitude, noise=0.0, low=0.1, high=5.0)
-        if max(shares(rig, excitation("chirp", slow), math.inf).values()) <= 1.0:
-            return like(rig, amplitude), amplitude
+    while max(shares(rig, command_of(amplitude=amplitude, **SLOW).y, math.inf).values()) > 1.0:
         amplitude *= 0.5
+    return like(rig, amplitude), amplitude
 
 
 def solution(case, rig):
@@ -121,17 +120,15 @@ def test_no_run_exceeds_the_limits(name, cause):
 
 
 def test_one_limit_is_used_and_not_a_fear_of_it():
-    rig = load_rig("paper_high_impedance")
     for kind, settings in EVERY.values():
-        assert allowed_run(rig, like(rig), kind, settings, 102.0).peak > 15.0
-    run = allowed_run(rig, like(rig), *EVERY["multisine 0.1-5 Hz"], 20.0)
-    assert np.abs(play_run(run, rig)).max() == pytest.approx(20.0, rel=0.01), "within them as requested"
+        assert allowed_run(RIG, like(RIG), kind, settings, 102.0).peak > 15.0
+    run = allowed_run(RIG, like(RIG), *EVERY["multisine 0.1-5 Hz"], 20.0)
+    assert np.abs(play_run(run, RIG)).max() == pytest.approx(20.0, rel=0.01), "within them as requested"
 
 
 def test_an_impossible_run_is_not_recommended():
-    rig = load_rig("paper_high_impedance")
     uneven = ExcitationSettings(rate=280.03, duration=12.0, noise=0.0)
-    assert allowed_run(rig, like(rig), "multisine", uneven, 20.0) is None
+    assert allowed_run(RIG, like(RIG), "multisine", uneven, 20.0) is None
 
 
 @pytest.mark.parametrize(
@@ -140,8 +137,7 @@ def test_an_impossible_run_is_not_recommended():
 )
 def test_an_amplitude_series_is_printed_only_where_its_residual_would_be_seen(amplitude, times_noise, factor):
     """At 60 N m twice as much is beyond the limits."""
-    rig = load_rig("paper_high_impedance")
-    experiment = amplitude_series(solution(like(rig, amplitude), rig), times_noise, RATE)
+    experiment = amplitude_series(solution(like(RIG, amplitude), RIG), times_noise, RATE)
     assert (experiment is None) == (factor is None)
     if factor:
         assert (experiment.reason, experiment.amplitude) == ("amplitude_series", factor)

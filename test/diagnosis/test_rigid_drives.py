@@ -1,19 +1,16 @@
 """Drives and joints without a spring: the torque that they lack, and its ripple over the rotor."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from runs import command_of, trying
 
 from rsea_ros import simulate
 from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.diagnosis.initial_guess import ripples, torque_along
-from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.effects.signal_table import Port
-from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.identification.problem import case_from
 from rsea_ros.model.inverse import motion_from, torques_along
 from rsea_ros.model.rig_file import load_rig
@@ -28,7 +25,7 @@ def test_the_missing_torque_of_a_rigid_joint_is_that_of_rotor_link_and_loop():
     rigid = replace(rig, quantities=kept, rigid_spring=True)
     t = np.arange(800) / 100.0
     record = synthesize(rigid, Channel(t, 0.5 * np.sin(2.0 * t)), seed=1)
-    case = case_from(replace(record, channels={n: record[n] for n in ("reference", "position")}), rigid)
+    case = case_from(Record({n: record[n] for n in ("reference", "position")}), rigid)
     error = 1e-3 * np.sin(5.0 * case.t["position"])
     _, torque = torque_along(case, rigid, {"position": case.measured["position"] - error})
     inertia = rigid["rotor.reflected_inertia"] + rigid["spring_end.inertia"]
@@ -63,8 +60,7 @@ def test_cogging_of_a_bare_drive_is_named():
     rig, record = cogging_record(seed=5)
     of_a_spring = {e.name for e in catalogue().values() if e.port is Port.SPRING}
     tried = of_a_spring | {"torque_ripple", "coulomb_friction", "stribeck_friction"}
-    settings = DiagnosisSettings(without=tuple(catalogue().keys() - tried))
-    diagnosis = diagnose([record], rig, settings=settings)
+    diagnosis = diagnose([record], rig, settings=trying(*tried))
     (cause,) = diagnosis.causes
     assert cause.name == "torque_ripple"
     assert cause.parameters["amplitude"].value == pytest.approx(3.0, abs=0.3)
@@ -88,10 +84,8 @@ def test_no_effect_reads_the_torque_by_which_it_is_judged():
 def test_the_torque_of_a_pendulum_that_turns_over_is_filtered_like_its_measurement():
     """The sine of a filtered angle has lines above the filter: 0.088 N m of 5.7 were left, without noise."""
     rig = load_rig("pendulum")
-    settings = ExcitationSettings(duration=20.0, amplitude=10.0, noise=2.0)
-    command = excitation("chirp", settings)
-    channel = Channel(np.arange(len(command)) / 280.0, command)
-    case = case_from(synthesize(rig, channel, noise=False), rig)
+    command = command_of("chirp", duration=20.0, amplitude=10.0, noise=2.0)
+    case = case_from(synthesize(rig, command, noise=False), rig)
     left = case.measured["motor_torque"] - torques_along(rig, case.drive)["motor_torque"]
     keep = case.mask["motor_torque"]
     assert np.std(left[keep]) < 2e-3 * np.std(case.measured["motor_torque"][keep])

@@ -1,7 +1,5 @@
 """Scores by hand: residuals over the noise by block, gains, and how far data may outweigh known values."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from types import SimpleNamespace
@@ -12,17 +10,6 @@ from scripted_scores import BLOCKS, model, score
 
 from rsea_ros.diagnosis import score as scores
 from rsea_ros.diagnosis.data_split import TEST, TRAIN, VALIDATION
-from rsea_ros.diagnosis.score import (
-    Score,
-    bootstrap_means,
-    gain_of,
-    likelier_by,
-    lost_above,
-    missed_response,
-    score_on,
-    temper,
-    tempered_loss,
-)
 from rsea_ros.diagnosis.settings import BlockSettings
 from rsea_ros.identification.problem import Case
 from rsea_ros.model.drive import Drive
@@ -81,7 +68,7 @@ def test_records_follow_each_other_and_may_lack_a_channel():
 def test_each_sample_is_in_training_validation_or_test():
     run, outputs = case(np.arange(32.0))
     parts = [
-        score_on(SimpleNamespace(channels=("ft",)), [run], of, [outputs], SECONDS)
+        scores.score_on(SimpleNamespace(channels=("ft",)), [run], of, [outputs], SECONDS)
         for of in (TRAIN, VALIDATION, TEST)
     ]
     assert all(p.counts["ft"].sum() > 0 for p in parts)
@@ -130,7 +117,7 @@ def two_runs(first, second):
     """The score of two runs of 4 and 1 blocks, of residuals over the noise; nan: the run has no samples."""
     squares = np.array([first, first, first, first, second]) ** 2
     counts = np.where(np.isfinite(squares), 100.0, 0.0)
-    return Score({"ft": np.nan_to_num(100.0 * squares)}, {"ft": counts}, run=np.array([0, 0, 0, 0, 1]))
+    return scores.Score({"ft": np.nan_to_num(100.0 * squares)}, {"ft": counts}, run=np.array([0, 0, 0, 0, 1]))
 
 
 def test_each_run_counts_in_units_of_its_own_residual():
@@ -151,21 +138,21 @@ def test_ratios_by_channel_and_the_worst():
     result = score(ft=2.0, position=8.0, velocity=0.5)
     assert result.ratios_in(0) == {"ft": 2.0, "position": 8.0, "velocity": 0.5}
     assert result.worst == "position"
-    assert Score({"ft": np.array([4.0])}, {"ft": np.array([1.0])}).ratio("ft") == 2.0
-    assert Score({"ft": np.zeros(1)}, {"ft": np.zeros(1)}).ratio("ft") == 0.0, "no sample, no residual"
-    assert Score({}, {}).missed == 0.0
+    assert scores.Score({"ft": np.array([4.0])}, {"ft": np.array([1.0])}).ratio("ft") == 2.0
+    assert scores.Score({"ft": np.zeros(1)}, {"ft": np.zeros(1)}).ratio("ft") == 0.0, "no sample, no residual"
+    assert scores.Score({}, {}).missed == 0.0
 
 
 def test_a_residual_of_zero_leaves_no_gain_undefined():
-    value, (low, high) = gain_of(np.zeros(4), np.array([0.0, 0.0, 0.0, 1.0]))
+    value, (low, high) = scores.gain_of(np.zeros(4), np.array([0.0, 0.0, 0.0, 1.0]))
     assert (value, low, high) == (1.0, 1.0, 1.0)
-    assert gain_of(np.zeros(4), np.zeros(4)) == (1.0, (1.0, 1.0))
+    assert scores.gain_of(np.zeros(4), np.zeros(4)) == (1.0, (1.0, 1.0))
 
 
 def test_the_interval_of_a_gain_is_that_of_blocks_drawn_anew():
     """Of 40 blocks that differ by 10 %: the mean is known to 10 % / sqrt(40), its root to half of that."""
     uneven = np.resize([1.1, 0.9], BLOCKS)
-    value, (low, high) = gain_of(uneven, np.ones(BLOCKS))
+    value, (low, high) = scores.gain_of(uneven, np.ones(BLOCKS))
     width = 1.96 * 0.5 * 0.1 / np.sqrt(BLOCKS)
     assert value == pytest.approx(0.0, abs=1e-12)
     assert -low == pytest.approx(width, rel=0.06) and high == pytest.approx(width, rel=0.06)
@@ -174,13 +161,13 @@ def test_the_interval_of_a_gain_is_that_of_blocks_drawn_anew():
 def test_an_interval_leaves_out_what_happens_less_than_once_in_forty():
     """Two of ten blocks hold all the residual. Five of them or more are drawn once in 30, six once in 157."""
     two = np.array([1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
-    value, interval = gain_of(two, np.ones(10))
+    value, interval = scores.gain_of(two, np.ones(10))
     assert value == 1.0 - np.sqrt(0.2)
     assert interval == (1.0 - np.sqrt(0.5), 1.0)
 
 
 def test_means_of_resampled_blocks_have_the_scatter_of_a_mean():
-    means = bootstrap_means(np.resize([1.0, -1.0], BLOCKS), 4000)
+    means = scores.bootstrap_means(np.resize([1.0, -1.0], BLOCKS), 4000)
     assert means.shape == (4000,)
     assert means.mean() == pytest.approx(0.0, abs=0.01)
     assert means.std() == pytest.approx(1.0 / np.sqrt(BLOCKS), rel=0.05)
@@ -196,7 +183,7 @@ def test_means_of_resampled_blocks_have_the_scatter_of_a_mean():
     ],
 )
 def test_data_weigh_as_much_as_their_blocks_agree(differences, weight):
-    assert temper(np.array(differences)) == weight
+    assert scores.temper(np.array(differences)) == weight
 
 
 @pytest.mark.parametrize(
@@ -206,7 +193,7 @@ def test_data_weigh_as_much_as_their_blocks_agree(differences, weight):
 def test_data_are_tempered_only_where_both_models_are_far_from_the_floor(ratios, far, tempered):
     one, other = score(ft=ratios[0], spread=0.5), score(ft=ratios[1], spread=-0.5)
     in_full = (one.loss(other) - other.loss(other)).sum()
-    share = (tempered_loss(one, other, far) - other.loss(other)).sum() / in_full
+    share = (scores.tempered_loss(one, other, far) - other.loss(other)).sum() / in_full
     assert 0.0 < share < 0.9 if tempered else share == pytest.approx(1.0)
 
 
@@ -214,7 +201,8 @@ def test_data_are_tempered_only_where_both_models_are_far_from_the_floor(ratios,
     ("ratio", "prior_cost", "by"), [(2.0, 3.0, -2.0), (2.0, 1.0, 0.0), (1.0, 3.0, 2998.0)]
 )
 def test_the_odds_are_those_of_the_data_and_of_the_known_values(ratio, prior_cost, by):
-    assert likelier_by(model(ft=ratio, prior_cost=prior_cost), model(ft=2.0, prior_cost=1.0), 5.0) == by
+    one, other = model(ft=ratio, prior_cost=prior_cost), model(ft=2.0, prior_cost=1.0)
+    assert scores.likelier_by(one, other, 5.0) == by
 
 
 def driven(count, error, *, rate=100.0, bad=()):
@@ -240,7 +228,7 @@ def driven(count, error, *, rate=100.0, bad=()):
 def test_a_response_is_missed_from_a_tenth_of_it_on(share, noise, blocks, bad, missed):
     """Coherence^2 of what is left with the command; 16 sound blocks are needed."""
     made, output, of = driven(100 * blocks, lambda y, own: share * y + noise * own, bad=bad)
-    found = missed_response(made, output, "ft", of)
+    found = scores.missed_response(made, output, "ft", of)
     assert found == pytest.approx(missed, abs=0.2 if noise and missed else 1e-6)
 
 
@@ -252,8 +240,8 @@ def test_a_channel_is_lost_above_the_frequency_from_which_it_is_noise(edge, rate
         return np.fft.irfft(lost, len(output))
 
     made, *_ = driven(20_000, error, rate=rate)
-    assert lost_above(made, "ft") == pytest.approx(edge, abs=0.02 * rate)
+    assert scores.lost_above(made, "ft") == pytest.approx(edge, abs=0.02 * rate)
     for sound in (lambda y, own: 0.0 * y, lambda y, own: 99.0 * own):
-        assert lost_above(driven(20_000, sound, rate=rate)[0], "ft") is None
-    assert lost_above(driven(100, error, rate=rate)[0], "ft") is None, "too short"
-    assert lost_above(replace(made, drive=SimpleNamespace()), "ft") is None
+        assert scores.lost_above(driven(20_000, sound, rate=rate)[0], "ft") is None
+    assert scores.lost_above(driven(100, error, rate=rate)[0], "ft") is None, "too short"
+    assert scores.lost_above(replace(made, drive=SimpleNamespace()), "ft") is None

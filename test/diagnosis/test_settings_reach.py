@@ -1,31 +1,23 @@
-"""Numbers beside the code of intervals and of the flexible law steer what they say."""
-
-from __future__ import annotations
+"""Numbers beside the code of the flexible law steer what it says."""
 
 import numpy as np
 import pytest
+from runs import RATE, RIG
 
+from rsea_ros import simulate
 from rsea_ros.checks.faults import check
 from rsea_ros.diagnosis.diagnose import nominal_problem
 from rsea_ros.diagnosis.naming import flexible as law
 from rsea_ros.diagnosis.naming.flexible import flexible, rows_of
 from rsea_ros.diagnosis.settings import DEFAULT
 from rsea_ros.effects.catalogue import effect_named
-from rsea_ros.identification import confidence
 from rsea_ros.identification.fit import add_effect
-from rsea_ros.identification.solver import solve
 from rsea_ros.identification.unknowns import start_vector
-from rsea_ros.model.rig_file import load_rig
-from rsea_ros.model.simulation import synthesize
-from rsea_ros.records.record import Channel
-
-RIG = load_rig("paper_high_impedance")
 
 
 @pytest.fixture(scope="module")
 def checked():
-    command = Channel(np.arange(1400) / 280.0, np.random.default_rng(3).normal(0.0, 5.0, 1400))
-    return check(synthesize(RIG, command, seed=3), RIG)
+    return check(simulate(RIG, np.random.default_rng(3).normal(0.0, 5.0, 1400), RATE, seed=3), RIG)
 
 
 @pytest.fixture(scope="module")
@@ -33,17 +25,6 @@ def with_friction(checked):
     """A problem with Coulomb friction that the record does not have, and its start."""
     problem, effect = nominal_problem([checked], RIG), effect_named("coulomb_friction")
     return add_effect(problem, start_vector(problem.unknowns), effect, effect.typical)
-
-
-def test_the_correction_of_an_interval_for_few_blocks(checked, monkeypatch):
-    problem = nominal_problem([checked], RIG)
-    solution = solve(problem, iterations=2)
-    variances = []
-    for most in (1.0, 100.0):
-        monkeypatch.setattr(confidence, "_MOST_CORRECTED", most)
-        variances.append(np.diag(confidence.confidence_of(solution).covariance))
-    few, many = variances
-    assert np.all(many >= few) and np.any(many > 2.0 * few)
 
 
 def test_the_knots_of_the_flexible_law(with_friction, monkeypatch):

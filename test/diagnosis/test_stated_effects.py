@@ -1,36 +1,28 @@
 """Effects that the rig states act, are fitted, and are never causes; the channel and rate of a verdict."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from runs import RATE, RIG, excited, only, trying
 
 from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.diagnosis.naming import conclusion as outcome
-from rsea_ros.diagnosis.settings import DiagnosisSettings
-from rsea_ros.effects.catalogue import catalogue, effect_named
+from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.errors import IdentificationError
-from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.model.rig import EffectSetting
-from rsea_ros.model.rig_file import load_rig
-from rsea_ros.model.simulation import synthesize
-from rsea_ros.records.record import Channel
+from rsea_ros.records.record import Channel, Record
 from rsea_ros.report.diagnosis.page import diagnosis_json
 from rsea_ros.report.diagnosis.words import terminal_lines
 
-RATE, DURATION = 280.0, 8.0
-RIG = load_rig("paper_high_impedance")
 FRICTION = EffectSetting("coulomb_friction", {**effect_named("coulomb_friction").typical, "torque": 3.0})
 GAP = EffectSetting("backlash", {**effect_named("backlash").typical, "gap": 4e-3})
-FEW = DiagnosisSettings(max_causes=1, without=tuple(set(catalogue()) - {"coulomb_friction", "backlash"}))
+FEW = trying("coulomb_friction", "backlash", max_causes=1)
+FRICTION_ALONE = trying("coulomb_friction", max_causes=1)
 
 
 def record_bench(*effects):
-    command = excitation("multisine", ExcitationSettings(rate=RATE, duration=DURATION, period=4.0))
-    bench = RIG.with_effects(*effects)
-    return synthesize(bench, Channel(np.arange(len(command)) / RATE, command), seed=3)
+    return excited(RIG.with_effects(*effects), "multisine", sensors=3, duration=8.0, period=4.0)
 
 
 def test_a_known_effect_acts_and_is_no_cause():
@@ -68,28 +60,16 @@ def test_an_accepted_effect_that_is_no_cause_is_listed_as_rejected(monkeypatch):
     assert dropped.reason == "leaves_too_much" and dropped.gain_holdout > 0.5
 
 
-FRICTION_ALONE = DiagnosisSettings(max_causes=1, without=tuple(set(catalogue()) - {"coulomb_friction"}))
-
-
 @pytest.mark.parametrize("name", ["ft", "velocity"])
 def test_a_record_with_one_sensor_is_diagnosed_on_it(name):
     """Velocity was missing from the list of main channels."""
-    rig = load_rig("paper_high_impedance")
-    command = excitation("multisine", ExcitationSettings(rate=280.0, duration=8.0, period=4.0))
-    bench = rig.with_effect("coulomb_friction", torque=3.0)
-    record = synthesize(bench, Channel(np.arange(len(command)) / 280.0, command), seed=3)
-    alone = type(record)({n: record[n] for n in ("command", name)})
-    diagnosis = diagnose([alone], rig, settings=FRICTION_ALONE)
+    diagnosis = diagnose([only(record_bench(FRICTION), name)], RIG, settings=FRICTION_ALONE)
     assert diagnosis.channel == name == diagnosis_json(diagnosis)["channel"]
     assert [(cause.name, cause.channel) for cause in diagnosis.causes] == [("coulomb_friction", name)]
 
 
 def test_the_rate_is_that_of_the_samples_without_their_copies():
     """Every message was logged twice."""
-    rig = load_rig("paper_high_impedance")
-    t = np.arange(8 * 280) / 280.0
-    once = synthesize(rig, Channel(t, 8.0 * np.sin(2.0 * np.pi * 2.0 * t)))
-    twice = once.with_channels(
-        **{n: Channel(np.repeat(c.t, 2), np.repeat(c.y, 2)) for n, c in once.channels.items()}
-    )
-    assert diagnose([twice], rig, settings=FRICTION_ALONE).rate == pytest.approx(280.0)
+    once = record_bench().channels
+    twice = Record({n: Channel(np.repeat(c.t, 2), np.repeat(c.y, 2)) for n, c in once.items()})
+    assert diagnose([twice], RIG, settings=FRICTION_ALONE).rate == pytest.approx(RATE)

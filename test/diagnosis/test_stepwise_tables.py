@@ -1,7 +1,5 @@
 """Stepwise selection as tables: the steps of a search, and where it ends."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from types import SimpleNamespace
 
@@ -44,8 +42,6 @@ class Step:
 
 class World:
     """Stepwise selection on scripted fits and steps. events: what happened to each model after its fit."""
-
-    now: World
 
     def __init__(self, monkeypatch, fits, steps):
         World.now = self

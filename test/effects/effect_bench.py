@@ -1,7 +1,5 @@
 """The bench on which every effect is tried: commands, and simulations with one effect on."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

@@ -3,8 +3,6 @@
 Angles and times stay, so it moves alike, and its diagnosis is the same in units of its torques.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 

@@ -5,8 +5,6 @@ x = (angle, speed, …) and the command u held, and returns (x', torque that the
 and speed that the encoder reads where they are not the first two of x.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from itertools import pairwise
@@ -172,8 +170,7 @@ LAWS: dict[str, tuple[int, Law]] = {
     "current_loop_overshoot": (4, overshoot),
     "damping_drift": (
         2, plain(lambda t, x, u, p: (u, B_M * p["relative_change"] * t / DURATION * x[1], 0.0))),
-    "dead_zone": (
-        2, plain(lambda t, x, u, p: (math.copysign(max(abs(u) - p["width"], 0.0), u), 0.0, 0.0))),
+    "dead_zone": (2, plain(lambda t, x, u, p: (math.copysign(max(abs(u) - p["width"], 0.0), u), 0.0, 0.0))),
     "directional_load_friction": (2, plain(directional)),
     "encoder_eccentricity": (2, eccentricity),
     "ft_bias": (2, sensor(lambda torque, t, p: torque + p["bias"])),
@@ -200,8 +197,7 @@ LAWS: dict[str, tuple[int, Law]] = {
         2, plain(lambda t, x, u, p: ((1 + p["relative_change"] * t / DURATION) * u, 0.0, 0.0))),
     "torque_constant_error": (2, plain(lambda t, x, u, p: (p["gain"] * u, 0.0, 0.0))),
     "torque_ripple": (2, plain(ripple)),
-    "torque_saturation": (
-        2, plain(lambda t, x, u, p: (math.copysign(min(abs(u), p["limit"]), u), 0.0, 0.0))),
+    "torque_saturation": (2, plain(lambda t, x, u, p: (math.copysign(min(abs(u), p["limit"]), u), 0.0, 0.0))),
     "viscoelastic_spring": (3, viscoelastic),
     "voltage_sag": (2, plain(sag)),
 }  # fmt: skip

@@ -1,17 +1,13 @@
-"""The contract of every effect of the catalogue, and how a new one is added."""
-
-from __future__ import annotations
+"""The contract of every effect of the catalogue; test_outside_effect.py adds one by one file."""
 
 import itertools
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from effect_bench import ON_THE_BENCH, RIG, SIGNALS, command, difference, drive, record_of, rms, simulate
 
 from rsea_ros.effects.catalogue import catalogue, effect_named
-from rsea_ros.effects.effect import Effect
 from rsea_ros.effects.signal_table import Port
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.drive import drive_from
@@ -64,7 +60,7 @@ def test_parameters_are_those_of_the_contract(name):
 
 
 @every_effect
-def test_the_null_effect_equals_the_nominal_model_to_the_last_bit(effect: Effect):
+def test_the_null_effect_equals_the_nominal_model_to_the_last_bit(effect):
     driven = drive(duration=2.0)
     nominal, extended = simulate(driven), simulate(driven, effect.name, effect.null)
     for channel, values in nominal.items():
@@ -72,7 +68,7 @@ def test_the_null_effect_equals_the_nominal_model_to_the_last_bit(effect: Effect
 
 
 @every_effect
-def test_the_effect_shrinks_to_nothing_with_its_parameters(effect: Effect):
+def test_the_effect_shrinks_to_nothing_with_its_parameters(effect):
     driven, sizes = drive(duration=2.0), []
     for share in (1.0, 0.1):
         at = {p.name: p.typical / share if p.null == np.inf else p.null + share * (p.typical - p.null)
@@ -83,14 +79,14 @@ def test_the_effect_shrinks_to_nothing_with_its_parameters(effect: Effect):
 
 
 @every_effect
-def test_the_step_is_short_enough(effect: Effect):
+def test_the_step_is_short_enough(effect):
     coarse, fine = (simulate(drive(refine=n), effect.name, effect.typical) for n in (1, 2))
     for name in SIGNALS:
         assert rms(coarse[name] - fine[name]) < HALF_STEP[name]
 
 
 @every_effect
-def test_the_simulation_is_finite_over_the_whole_bounds(effect: Effect):
+def test_the_simulation_is_finite_over_the_whole_bounds(effect):
     driven, bounds = drive(duration=0.5), [(p.low, p.high) for p in effect.parameters]
     corners = ([p.typical for p in effect.parameters], *itertools.product(*bounds))
     for bench in map(load_rig, RIGS):
@@ -105,14 +101,14 @@ def test_the_simulation_is_finite_over_the_whole_bounds(effect: Effect):
 
 
 @every_effect
-def test_the_simulation_is_finite_beside_a_soft_gear(effect: Effect):
+def test_the_simulation_is_finite_beside_a_soft_gear(effect):
     soft = RIG.with_values({"gear.stiffness": 1e4})
     for values in simulate(drive(duration=1.0), effect.name, effect.typical, soft).values():
         assert np.abs(values).max() < 100.0
 
 
 @every_effect
-def test_every_effect_is_described_for_people_and_for_fits(effect: Effect):
+def test_every_effect_is_described_for_people_and_for_fits(effect):
     assert effect.about and len(effect.about) < 80
     assert all(p.name in effect.equation for p in effect.parameters), effect.equation
     for p in effect.parameters:
@@ -123,7 +119,7 @@ def test_every_effect_is_described_for_people_and_for_fits(effect: Effect):
 
 
 @every_effect
-def test_wrong_parameters_are_refused(effect: Effect):
+def test_wrong_parameters_are_refused(effect):
     good = effect.typical
     with pytest.raises(ParameterError, match=f"{effect.name}: unknown parameter 'colour'"):
         simulate(drive(duration=1.0), effect.name, {**good, "colour": 1.0})
@@ -138,44 +134,8 @@ def test_an_unknown_effect_is_refused():
         effect_named("stickiness")
 
 
-NEW_EFFECT = '''
-"""Torque that a fan takes.
-
-    T = -coefficient * w * |w|
-"""
-
-from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
-from rsea_ros.effects.signal_table import GEAR_TORQUE, GEAR_VELOCITY, Port
-
-
-@compiled
-def apply(s, p, x):
-    s[GEAR_TORQUE] -= p[0] * s[GEAR_VELOCITY] * abs(s[GEAR_VELOCITY])
-
-
-EFFECT = Effect(
-    name="fan",
-    port=Port.GEAR,
-    parameters=(Parameter("coefficient", "N m s^2/rad^2", null=0.0, low=0.0, high=200.0, typical=50.0),),
-    claims=Claims("velocity", "odd", amplitude_exponent=2.0, passive=True),
-    function=apply,
-    reads=(GEAR_VELOCITY,),
-)
-'''
-
-
-def test_an_effect_is_added_by_adding_one_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    (tmp_path / "fan.py").write_text(NEW_EFFECT)
-    assert "fan" not in catalogue()
-    monkeypatch.setenv("RSEA_EFFECTS", str(tmp_path))
-    assert set(catalogue()) > set(CONTRACT)
-    driven = drive(duration=2.0)
-    sizes = [rms(difference(simulate(driven, "fan", {"coefficient": c}), simulate(driven))) for c in (0, 50)]
-    assert sizes[0] == 0.0 and sizes[1] > 10.0
-
-
 @pytest.mark.parametrize("source", ["1 / 0", "def", "import no_such_module", "raise MemoryError"])
-def test_a_file_that_fails_is_a_fault_of_that_file(tmp_path: Path, monkeypatch, source: str):
+def test_a_file_that_fails_is_a_fault_of_that_file(tmp_path, monkeypatch, source):
     (tmp_path / "broken.py").write_text(source)
     monkeypatch.setenv("RSEA_EFFECTS", str(tmp_path))
     with pytest.raises(ParameterError, match=r"RSEA_EFFECTS: .*broken\.py: \w+Error"):
@@ -183,7 +143,7 @@ def test_a_file_that_fails_is_a_fault_of_that_file(tmp_path: Path, monkeypatch, 
 
 
 @pytest.mark.parametrize("port", [Port.COMMAND, Port.MOTOR, Port.SENSOR])
-def test_an_effect_that_would_read_a_state_where_none_is_filled_is_refused(port: Port):
+def test_an_effect_that_would_read_a_state_where_none_is_filled_is_refused(port):
     """A torque constant that depends on GEAR_ANGLE changed nothing at all, in silence."""
     with pytest.raises(ParameterError, match=rf"torque_ripple: reads at port {port.name}, expected"):
         replace(effect_named("torque_ripple"), port=port)

@@ -1,7 +1,5 @@
 """The properties that the effects claim, checked against the simulation."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 
@@ -11,8 +9,7 @@ from effect_bench import NOISE, ON_THE_BENCH, RIG, command, difference, drive, r
 from scipy.optimize import least_squares
 
 from rsea_ros.effects.catalogue import catalogue
-from rsea_ros.effects.effect import Effect
-from rsea_ros.model.drive import Drive, drive_from
+from rsea_ros.model.drive import drive_from
 
 every_effect = pytest.mark.parametrize("effect", ON_THE_BENCH, ids=lambda e: e.name)
 PASSIVE = [e for e in ON_THE_BENCH if e.claims.passive]
@@ -20,13 +17,13 @@ PAIRS = [(e, rival) for e in ON_THE_BENCH for rival in e.claims.confusable_with]
 NOMINAL = ("rotor.reflected_inertia", "rotor.reflected_damping", "spring.stiffness", "spring.damping")
 
 
-def change(effect: Effect, driven: Drive) -> np.ndarray:
+def change(effect, driven):
     """Return what the effect changes at its typical size, in units of the noise."""
     return difference(simulate(driven, effect.name, effect.typical), simulate(driven))
 
 
 @every_effect
-def test_an_effect_shows_most_in_its_stated_channel(effect: Effect):
+def test_an_effect_shows_most_in_its_stated_channel(effect):
     driven = drive(duration=10.0)
     nominal, extended = simulate(driven), simulate(driven, effect.name, effect.typical)
     shows = {n: rms(extended[n] - nominal[n]) / noise for n, noise in NOISE.items()}
@@ -34,7 +31,7 @@ def test_an_effect_shows_most_in_its_stated_channel(effect: Effect):
 
 
 @every_effect
-def test_an_effect_has_its_stated_parity(effect: Effect):
+def test_an_effect_has_its_stated_parity(effect):
     forward, backward = (change(effect, drive(amplitude=a)) for a in (20.0, -20.0))
     odd, even = rms(forward - backward) / 2, rms(forward + backward) / 2
     share = even / (odd + even)
@@ -43,7 +40,7 @@ def test_an_effect_has_its_stated_parity(effect: Effect):
 
 
 @every_effect
-def test_an_effect_grows_with_the_amplitude_as_stated(effect: Effect):
+def test_an_effect_grows_with_the_amplitude_as_stated(effect):
     sizes = [rms(change(effect, drive(amplitude=a))) for a in (6.0, 12.0, 24.0)]
     exponents = np.diff(np.log2(np.maximum(sizes, 1e-6)))
     if effect.claims.amplitude_exponent is None:
@@ -53,7 +50,7 @@ def test_an_effect_grows_with_the_amplitude_as_stated(effect: Effect):
 
 
 @pytest.mark.parametrize("effect", PASSIVE, ids=lambda e: e.name)
-def test_a_passive_effect_only_takes_energy(effect: Effect):
+def test_a_passive_effect_only_takes_energy(effect):
     rig = RIG.with_values({"rotor.reflected_damping": 0.0, "spring.damping": 0.0})
     silence = replace(command(280.0, 5.0), y=np.zeros(1400))
     thrown = drive_from(record_of(silence, start=(0.6 / 280.0, 0.6)))  # a period after it began at 0
@@ -69,20 +66,20 @@ def test_a_passive_effect_only_takes_energy(effect: Effect):
 
 
 @pytest.mark.parametrize(("effect", "rival"), PAIRS, ids=lambda v: v if isinstance(v, str) else v.name)
-def test_a_rival_explains_most_of_what_a_refit_leaves(effect: Effect, rival: str):
+def test_a_rival_explains_most_of_what_a_refit_leaves(effect, rival):
     driven, measured, left = _left_of(effect.name)
     assert _misfit(driven, measured, catalogue()[rival]) < left / 2
 
 
 @cache
-def _left_of(name: str) -> tuple[Drive, dict[str, np.ndarray], float]:
+def _left_of(name):
     """Return a drive, what an effect makes of it, and what a refit of the nominal rig leaves of that."""
     driven = drive(duration=2.5)
     measured = simulate(driven, name, catalogue()[name].typical)
     return driven, measured, _misfit(driven, measured, None)
 
 
-def _misfit(driven: Drive, measured: dict[str, np.ndarray], other: Effect | None) -> float:
+def _misfit(driven, measured, other):
     """Return the least sum of squares of the nominal rig, or of that with another effect, refitted."""
     nominal = np.array([RIG[n] for n in NOMINAL])
     parameters = other.parameters if other else ()
@@ -90,7 +87,7 @@ def _misfit(driven: Drive, measured: dict[str, np.ndarray], other: Effect | None
     high = np.concatenate([3.0 * nominal, [p.high for p in parameters]])
     scale = np.concatenate([nominal, [abs(p.typical) or 1.0 for p in parameters]])
 
-    def residual(theta: np.ndarray) -> np.ndarray:
+    def residual(theta):
         rig = RIG.with_values(dict(zip(NOMINAL, theta[:4], strict=True)))
         setting = {p.name: float(v) for p, v in zip(parameters, theta[4:], strict=True)}
         name = other.name if other else ""
@@ -103,7 +100,7 @@ def _misfit(driven: Drive, measured: dict[str, np.ndarray], other: Effect | None
     return float(2 * fit.cost)
 
 
-def _starts(other: Effect | None) -> list[list[float]]:
+def _starts(other):
     """Return where a fit may begin: typical sizes, the starts of each parameter, and the other sign."""
     if other is None:
         return [[]]

@@ -1,14 +1,12 @@
 """One file that RSEA_EFFECTS names is an effect everywhere: nothing else knows effects by their names."""
 
-from __future__ import annotations
-
 import math
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from effect_bench import RIG, command
+from runs import trying
 from similar_machine import record_with
 
 from rsea_ros.control.compensation import compensation
@@ -17,7 +15,6 @@ from rsea_ros.control.uncertainty import lag_responses
 from rsea_ros.diagnosis.candidate import with_clocks_in_delays
 from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.diagnosis.naming.conclusion import undetermined_play
-from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.effects.catalogue import catalogue, effect_named
 from rsea_ros.exports.bam import export_bam
 from rsea_ros.exports.mjcf import export_mjcf
@@ -29,7 +26,6 @@ from rsea_ros.identification.solver import solve
 from rsea_ros.identification.unknowns import start_vector, unknowns_of_effect
 from rsea_ros.laws.choice import fitted_base
 from rsea_ros.model.observer.assemble import without_delay
-from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
 from rsea_ros.records.record import MEASURED
@@ -99,7 +95,7 @@ SIZE = {"coefficient": 8.0, "creep_velocity": 2e-3}
 
 @pytest.fixture(scope="module", autouse=True)
 def outside(tmp_path_factory):
-    folder: Path = tmp_path_factory.mktemp("effects")
+    folder = tmp_path_factory.mktemp("effects")
     (folder / "paddle.py").write_text(PADDLE)
     for old, new in (("command_delay", "late_bus"), ("backlash", "worn_key")):
         (folder / f"{new}.py").write_text(ANOTHER_NAME.format(old=old, new=new))
@@ -114,19 +110,19 @@ def record():
 
 
 def with_paddle():
-    return RIG.with_effects(EffectSetting("paddle", SIZE))
+    return RIG.with_effect("paddle", **SIZE)
 
 
 def test_an_outside_effect_is_simulated_and_identified(record):
-    guessed = RIG.with_effects(EffectSetting("paddle", {**SIZE, "coefficient": 3.0}))
+    guessed = RIG.with_effect("paddle", **(SIZE | {"coefficient": 3.0}))
     identified = identify([record], guessed)
     sizes = {p.name: p.value for p in identified.parameters}
     assert sizes["paddle.coefficient"] == pytest.approx(8.0, rel=0.1)
+    assert set(catalogue()) > {"paddle", "late_bus", "worn_key", "coulomb_friction"}
 
 
 def test_a_diagnosis_names_an_outside_effect(record):
-    tried = ("paddle", "coulomb_friction", "damping_drift")
-    settings = DiagnosisSettings(max_causes=1, without=tuple(n for n in catalogue() if n not in tried))
+    settings = trying("paddle", "coulomb_friction", "damping_drift", max_causes=1)
     diagnosis = diagnose([record], RIG, settings=settings)
     assert [cause.name for cause in diagnosis.causes] == ["paddle"]
     assert diagnosis.causes[0].parameters["coefficient"].value == pytest.approx(8.0, rel=0.1)
@@ -141,7 +137,7 @@ def test_a_law_is_searched_beside_an_outside_effect(record):
 @pytest.mark.parametrize("export", [export_mjcf, export_urdf, export_bam], ids=lambda e: e.__name__)
 def test_an_export_says_that_it_leaves_an_outside_effect_out(export):
     rig = load_rig("pendulum" if export is export_bam else "paper_moving_output")
-    exported = export(rig.with_effects(EffectSetting("paddle", SIZE)))
+    exported = export(rig.with_effect("paddle", **SIZE))
     assert "paddle" in exported.leaves_out
 
 
@@ -149,7 +145,7 @@ def test_the_controller_compensates_an_outside_effect_by_the_law_of_the_step():
     mean = 8.0 * np.mean(np.sqrt(np.linspace(0.19, 0.21, 20001)))
     assert compensation(with_paddle()).friction(0.19, 0.21) == pytest.approx(mean, rel=1e-3)
     assert compensation(with_paddle(), ()).friction(0.19, 0.21) == 0.0
-    assert compensation(RIG.with_effects(EffectSetting("worn_key", {"gap": 3e-3}))).gap == 3e-3, "crossed"
+    assert compensation(RIG.with_effect("worn_key", gap=3e-3)).gap == 3e-3, "crossed"
 
 
 def test_a_joint_reports_play_of_another_name_that_its_data_do_not_show():
@@ -163,7 +159,7 @@ def test_a_joint_reports_play_of_another_name_that_its_data_do_not_show():
 
 
 def test_a_delay_of_another_name_is_treated_as_a_delay():
-    rig = RIG.with_effects(EffectSetting("late_bus", {"delay": 4e-3}))
+    rig = RIG.with_effect("late_bus", delay=4e-3)
     assert without_delay(rig) == (RIG.with_effects(), 4e-3)
     hz, plant = np.array([10.0]), sample_rig(RIG, 280.0)
     response, path = lag_responses(rig, plant, hz)

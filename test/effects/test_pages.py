@@ -1,7 +1,5 @@
 """The pages of effects in a notebook are well-formed HTML with all that the catalogue knows."""
 
-from __future__ import annotations
-
 from xml.etree import ElementTree
 
 import pytest
@@ -11,11 +9,11 @@ from rsea_ros.documents.units import plain
 from rsea_ros.effects.catalogue import catalogue
 
 
-def rows(html: str) -> list[list[str]]:
+def rows(html):
     return [["".join(cell.itertext()) for cell in row] for row in ElementTree.fromstring(html).iter("tr")]
 
 
-def test_the_catalogue_lists_name_meaning_and_equation() -> None:
+def test_the_catalogue_lists_name_meaning_and_equation():
     head, *lines = rows(effects._repr_html_())
     assert head == ["effect", "what it is", "equation"]
     known = {name: effects[name] for name in catalogue()}
@@ -26,7 +24,7 @@ def test_the_catalogue_lists_name_meaning_and_equation() -> None:
 
 
 @pytest.mark.parametrize("name", ["coulomb_friction", "backlash", "torque_ripple", "command_delay"])
-def test_a_page_has_a_row_for_each_parameter(name: str) -> None:
+def test_a_page_has_a_row_for_each_parameter(name):
     page = effects[name]
     html = page._repr_html_()
     head, *lines = rows(f"<div>{html}</div>")
@@ -46,7 +44,7 @@ def test_a_page_has_a_row_for_each_parameter(name: str) -> None:
     [("coulomb_friction", "torque", "torque"), ("quadratic_drag", "coefficient", "torque / speed^2"),
      ("command_delay", "delay", ""), ("torque_ripple", "phase", "")],
 )  # fmt: skip
-def test_bounds_grow_with_the_machine(name: str, parameter: str, grows: str) -> None:
+def test_bounds_grow_with_the_machine(name, parameter, grows):
     page = effects[name]
     (which,) = (p for p in page.effect.parameters if p.name == parameter)
     assert page.grows_with(which) == grows

@@ -1,7 +1,5 @@
 """Bounds and sizes of effects go with the machine."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from independent.bench import Bench, record_command
 from independent.hidden import hide
+from runs import RATE, RIG
 
 from rsea_ros.experiment.advice import HOPELESS, advise, bound, proofs_of
 from rsea_ros.experiment.hypothesis import Hypothesis, motion, run_case
@@ -28,12 +29,10 @@ from rsea_ros.experiment.stored_models import hypotheses_from, model_of
 from rsea_ros.identification.excitation import ExcitationSettings, chirp
 from rsea_ros.identification.solver import power, solve
 from rsea_ros.identification.unknowns import start_vector
-from rsea_ros.model.rig_file import load_rig
 
-RIG = load_rig("paper_high_impedance")
 LIMITS = RunLimits(torque=15.0, velocity=1.5, deflection=0.03)
 BRIEF = DesignRequest(LIMITS, 280.0, 0.05, 0.8, probe=0.8, refine=0, kinds=("steps",), per_run=0.0)
-ASKED = DesignRequest(LIMITS, refine=3, probe=1.0, kinds=("multisine", "chirp"))
+ASKED = DesignRequest(LIMITS, refine=1, probe=1.0, kinds=("multisine", "chirp"))
 NOISE = {"ft": 0.03, "position": 6e-6}
 
 
@@ -162,9 +161,6 @@ def test_a_bound_by_sines_does_not_cover_all_runs_on_a_nonlinear_cause():
     names = [[tuple(h.name for h in pair)] for pair in pairs]
     proofs = [proofs_of(p, n, ASKED, noise)[0] for p, n in zip(pairs, names, strict=True)]
     assert [p.covers_all for p in proofs] == [False, True]
-
-
-RATE = 280.0
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -1,7 +1,5 @@
 """Runs: their rest, ramps, levels, lines and slew; their peaks, limits and files."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

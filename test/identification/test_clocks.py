@@ -1,23 +1,22 @@
 """Clocks are fitted only where the data require it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from benches import bench, record_bench
+from runs import RIG, excited
 
 from rsea_ros.identification.identify import identify
 from rsea_ros.model.rig import Sensor
 from rsea_ros.model.rig_document import rig_from_document
-from rsea_ros.model.rig_file import load_rig, rig_to_document
-from rsea_ros.model.simulation import simulate, synthesize
-from rsea_ros.records.record import Channel, Record
+from rsea_ros.model.rig_file import rig_to_document
+from rsea_ros.model.simulation import simulate
+from rsea_ros.records.record import Channel
 from rsea_ros.report.remark_words import remark_sentences
 
 
-def with_clock(record: Record, channel: str, offset: float, ppm: float) -> Record:
+def with_clock(record, channel, offset, ppm):
     """Return a record whose sensor was read later than stamped, by s at the start and ppm of the time."""
     t = record[channel].t
     stamps = t - offset - 1e-6 * ppm * (t - record["command"].t[0])
@@ -43,12 +42,9 @@ def test_correct_clocks_are_left_alone_and_their_cost_is_reported():
 
 @pytest.mark.parametrize(
     ("offset", "ppm", "moved"),
-    [
-        (8e-5, 0.0, {"clock.ft"}),
-        (0.0, 90.0, {"clock_rate.ft"}),
-        (1.5e-4, -90.0, {"clock.ft", "clock_rate.ft"}),
-    ],
-)
+    [(8e-5, 0.0, {"clock.ft"}), (0.0, 90.0, {"clock_rate.ft"}),
+     (1.5e-4, -90.0, {"clock.ft", "clock_rate.ft"})],
+)  # fmt: skip
 def test_a_wrong_clock_is_fitted_with_its_size(offset, ppm, moved):
     nominal, true = bench("paper_high_impedance", 1)
     result = identify([with_clock(record_bench(true, 1, 20.0), "ft", offset, ppm)], nominal)
@@ -72,22 +68,17 @@ def test_a_clock_rate_is_part_of_the_rig():
     assert np.abs(late - simulate(true, record)["ft"]).max() > 0.02
 
 
-def sweep(seconds):
-    """Return 8 N m from 0.2 to 60 Hz."""
-    t = np.arange(0.0, seconds, 1.0 / 280.0)
-    turns = 0.2 * seconds / np.log(300.0) * (300.0 ** (t / seconds) - 1.0)
-    return Channel(t, 8.0 * np.sin(2.0 * np.pi * turns))
+SWEEP = {"kind": "chirp", "sensors": 1, "amplitude": 8.0, "noise": 0.0, "low": 0.2, "high": 60.0}
 
 
 @pytest.mark.parametrize(("channels", "ppm"), [(("ft",), 200.0), (("position", "velocity"), -450.0)])
 def test_a_drift_that_turns_the_phases_is_fitted(channels, ppm):
     """6 ms by the end of a chirp left 6 times the noise and the damping 28.4 for 25.4 N m s/rad."""
-    nominal = load_rig("paper_high_impedance")
-    true = nominal.with_values({"rotor.reflected_damping": 25.4, "spring.stiffness": 1480.0})
-    record = synthesize(true, sweep(30.0), seed=1)
+    true = RIG.with_values({"rotor.reflected_damping": 25.4, "spring.stiffness": 1480.0})
+    record = excited(true, duration=30.0, **SWEEP)
     for n in channels:
         record = with_clock(record, n, 0.0, ppm)
-    result = identify([record], nominal)
+    result = identify([record], RIG)
     assert max(result.times_noise.values()) < 1.1
     for n in channels:
         assert clocks(result)[f"clock_rate.{n}"].value == pytest.approx(ppm, abs=2.0)
@@ -97,8 +88,7 @@ def test_a_drift_that_turns_the_phases_is_fitted(channels, ppm):
 
 def test_a_damping_that_drifts_is_taken_for_no_clock_that_does():
     """Its lag grows along a line, but a clock's rate explains too little of the misfit."""
-    rig = load_rig("paper_high_impedance")
-    record = synthesize(rig.with_effect("damping_drift", relative_change=-0.3), sweep(20.0), seed=1)
-    result = identify([record], rig)
+    record = excited(RIG.with_effect("damping_drift", relative_change=-0.3), duration=20.0, **SWEEP)
+    result = identify([record], RIG)
     assert result.verdict == "misfit"
     assert not [name for name in clocks(result) if name.startswith("clock_rate")]

@@ -1,12 +1,12 @@
 """The doubt of a fit beside the formulas of its sources, and what is said of values that data leave open."""
 
-from __future__ import annotations
-
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from runs import RIG, excited
 
 from rsea_ros.identification import confidence
 from rsea_ros.identification.confidence import (
@@ -26,7 +26,9 @@ from rsea_ros.identification.confidence import (
     torque_scale,
     undetermined_remarks,
 )
-from rsea_ros.identification.result import ParameterEstimate
+from rsea_ros.identification.fit import fit
+from rsea_ros.identification.problem import case_from
+from rsea_ros.identification.result import ParameterEstimate, Remark, shares_from_data
 from rsea_ros.identification.solver import Solution
 from rsea_ros.identification.unknowns import Unknown
 from rsea_ros.model.drive import Drive
@@ -49,31 +51,34 @@ def case(drive=None, **measured):
 
 def problem(unknowns, *cases, loop=None, free=()):
     rig = SimpleNamespace(loop=loop, linear=False, free=lambda: free)
-    return SimpleNamespace(
-        unknowns=tuple(unknowns), cases=cases, rig=rig, present=lambda c: list(c.measured),
-        residual=lambda theta: J @ theta,
-    )  # fmt: skip
+    return SimpleNamespace(unknowns=tuple(unknowns), cases=cases, rig=rig, present=lambda c: list(c.measured))
 
 
 J, R = RNG.standard_normal((600, 3)), 2.0 * np.repeat(RNG.standard_normal(60), 10)
 DOUBTS = np.array([0.5, 2.0, 1.0])
 
 
-def solved(doubts=DOUBTS, jacobian=J, residual=R, drive=None):
-    made = problem([unknown(n, doubt=d) for n, d in zip("abc", doubts, strict=True)], case(drive, ft=T))
+def solved(jacobian=J, residual=R, drive=None):
+    measured = case(drive, ft=T)
+    measured.mask["ft"] = np.arange(600) < len(residual)
+    made = problem([unknown(n, doubt=d) for n, d in zip("abc", DOUBTS, strict=True)], measured)
+    made.residual = lambda theta: J[: len(residual)] @ theta
     return Solution(made, np.array([1.0, 2.0, 3.0]), residual, jacobian, 0.0)
 
 
-def test_the_covariance_is_whites_sandwich_over_blocks_of_a_second_beside_the_prior():
-    found = confidence_of(solved())
-    inverse = np.linalg.inv(J.T @ J + np.diag(1.0 / DOUBTS**2))
-    scores = np.array([J[100 * k : 100 * k + 100].T @ R[100 * k : 100 * k + 100] for k in range(6)])
+@pytest.mark.parametrize(("seconds", "corrected"), [(6, 6 / 3), (3, 4.0)])
+def test_the_covariance_is_whites_sandwich_over_blocks_of_a_second_beside_the_prior(seconds, corrected):
+    """Times n / (n - p) of n blocks and p unknowns, four at most."""
+    j, r = J[: 100 * seconds], R[: 100 * seconds]
+    found = confidence_of(solved(j, r))
+    inverse = np.linalg.inv(j.T @ j + np.diag(1.0 / DOUBTS**2))
+    scores = np.array([j[100 * k : 100 * k + 100].T @ r[100 * k : 100 * k + 100] for k in range(seconds)])
     assert BLOCK == 1.0
-    middle = scores.T @ scores * 6.0 / max(6 - 3, 6 / 4.0) + np.diag(1.0 / DOUBTS**2)
+    middle = scores.T @ scores * corrected + np.diag(1.0 / DOUBTS**2)
     expected = inverse @ middle @ inverse
     larger = np.sqrt(np.maximum(1.0, np.diag(inverse) / np.diag(expected)))
     assert found.covariance == pytest.approx(expected * np.outer(larger, larger), rel=1e-6)
-    assert found.information == pytest.approx(J.T @ J) and found.theta.tolist() == [1.0, 2.0, 3.0]
+    assert found.information == pytest.approx(j.T @ j) and found.theta.tolist() == [1.0, 2.0, 3.0]
     sd = np.sqrt(np.diag(found.covariance))
     assert found.correlation == pytest.approx(found.covariance / np.outer(sd, sd))
     none = Confidence(np.zeros(2), np.diag([4.0, 0.0]), np.zeros(2), np.zeros((2, 2)))
@@ -211,3 +216,54 @@ def test_estimates_and_errors_are_those_of_the_fit():
     assert errors["position"][0] == pytest.approx(-T)
     (shown,) = overlays_of(first, {"ft": T + 1.0})
     assert shown.channel == "ft" and shown.measured is first.measured["ft"] and shown.simulated[0] == 3.0
+
+
+@pytest.fixture(scope="module")
+def solution():
+    """The fit of a rig with a hardening spring to 4 s."""
+    record = excited(RIG, "multisine", sensors=3, duration=4.0, period=4.0)
+    return fit((case_from(record, RIG),), RIG.with_effect("nonlinear_spring"))[0]
+
+
+def test_an_unknown_without_sensitivity_has_the_widest_interval_and_is_reported(monkeypatch, solution):
+    """A bound of 2e4 beside priors of 0.01 was cut off as a singular direction: its doubt came out as 0."""
+    names = [u.name for u in solution.problem.unknowns]
+    i = names.index("nonlinear_spring.cubic")
+    matrix = solution.jacobian.copy()
+    matrix[:, i] = 0.0
+    monkeypatch.setattr(confidence, "central_jacobian", lambda *_: matrix)
+    doubt = confidence.confidence_of(replace(solution, jacobian=matrix))
+    assert np.sqrt(doubt.covariance[i, i]) == pytest.approx(solution.problem.unknowns[i].reach, rel=1e-6)
+    remarks = confidence.undetermined_remarks(solution.problem.unknowns, doubt)
+    assert Remark("not_shown", ("nonlinear_spring.cubic",)) in remarks
+
+
+def test_no_variance_of_indistinguishable_unknowns_is_negative(monkeypatch, solution):
+    """Rounding left a variance below zero, and its root was a warning and no interval."""
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        matrix = 1e9 * np.outer(rng.normal(size=len(solution.residual)), rng.normal(size=len(solution.theta)))
+        monkeypatch.setattr(confidence, "central_jacobian", lambda *_, matrix=matrix: matrix)
+        doubt = confidence.confidence_of(replace(solution, jacobian=matrix))
+        assert np.all(np.diag(doubt.covariance) > 0.0)
+
+
+def test_values_of_which_only_a_combination_is_determined_are_not_and_nothing_is_singular():
+    """Beside 1e28 the little that stands in for no information is lost: LinAlgError, told as a bug."""
+    together = np.array([1e14, 1e14, 1.0])
+    assert (shares_from_data(np.outer(together, together), np.ones(3)) < 1e-6).all()
+    assert (shares_from_data(1e6 * np.eye(3), np.ones(3)) > 0.99).all()
+
+
+def test_far_from_the_noise_a_value_is_determined_in_part_at_most():
+    """Each was "yes" beside 9 801 times the noise."""
+    sure = ParameterEstimate("spring.damping", 1.24, "N m s/rad", (1.1, 1.3), 0.2, 2.0, 1.0)
+    assert sure.determined == "yes"
+    assert replace(sure, beside_misfit=True).determined == "in part"
+
+
+def test_the_angle_of_a_pendulum_is_an_angle():
+    """-25374.51895 +- 0.00044 rad was one that had run around."""
+    angle = Unknown("spring_end.gravity_angle", 0.0, "rad", -np.inf, np.inf, False, np.inf, 1.0)
+    low, high = interval(angle, -25374.0, 1e3)
+    assert abs(angle.outer(-25374.0)) <= np.pi and high - low == pytest.approx(2.0 * np.pi)

@@ -112,15 +112,9 @@ def test_limit_names_value_unit_limit_and_time():
         (lambda: excitation("sweep", PAPER), "expected one of chirp"),
         (lambda: ExcitationSettings(duration=float("nan")), "duration = nan s"),
         (lambda: ExcitationSettings(low=133.0), "low = 133 Hz"),
-        (
-            lambda: excitation("steps", ExcitationSettings(duration=1.0), ramp=0.6),
-            "ramp = 0.6 s, expected 0 to 0.5 s",
-        ),
+        (lambda: excitation("steps", ExcitationSettings(duration=1.0), ramp=0.6), "ramp = 0.6 s, expected 0"),
         (lambda: multisine(ExcitationSettings(period=0.0101)), "whole number of samples"),
-        (
-            lambda: multisine(ExcitationSettings(period=1.0, low=1.1, high=1.9)),
-            "expected one with odd lines in 1.1 to 1.9 Hz",
-        ),
+        (lambda: multisine(ExcitationSettings(period=1.0, low=1.1, high=1.9)), "odd lines in 1.1 to 1.9 Hz"),
     ],
 )
 def test_settings_that_make_no_sense_are_refused(call, message):

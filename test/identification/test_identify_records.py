@@ -1,18 +1,16 @@
 """Records as they come: other stamps, jitter, missing samples, several bags, a controller in the loop."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from benches import RATE, bench, record_bench
+from benches import bench, record_bench
+from runs import RATE, RIG
 
 from rsea_ros.errors import IdentificationError
 from rsea_ros.identification.fit import even_clock
 from rsea_ros.identification.identify import identify
-from rsea_ros.model.rig import PositionLoop, Rig
-from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.rig import PositionLoop
 from rsea_ros.model.simulation import measure, simulate
 from rsea_ros.records.record import Channel, Record
 from rsea_ros.report.remark_words import remark_sentences
@@ -20,7 +18,7 @@ from rsea_ros.report.remark_words import remark_sentences
 PERIOD = 1.0 / RATE
 
 
-def resample(true: Rig, record: Record, stamps: dict[str, np.ndarray], seed: int) -> Record:
+def resample(true, record, stamps, seed):
     """Return the record with some channels measured at other instants, and stamped with them."""
     rng = np.random.default_rng(seed)
     asked = record.with_channels(**{n: Channel(t, np.zeros(len(t))) for n, t in stamps.items()})
@@ -28,7 +26,7 @@ def resample(true: Rig, record: Record, stamps: dict[str, np.ndarray], seed: int
     return asked.with_channels(**{n: Channel(t, measure(true, n, values[n], rng)) for n, t in stamps.items()})
 
 
-def agree(result, true: Rig, sigmas: float = 4.0) -> None:
+def agree(result, true, sigmas=4.0):
     for p in result.parameters:
         if p.name in true.quantities:
             sd = (p.ci95[1] - p.ci95[0]) / (2.0 * 1.96)
@@ -36,7 +34,7 @@ def agree(result, true: Rig, sigmas: float = 4.0) -> None:
 
 
 @pytest.fixture(scope="module")
-def case() -> tuple[Rig, Rig, Record]:
+def case():
     nominal, true = bench("paper_high_impedance", 7)
     return nominal, true, record_bench(true, 7, 10.0)
 
@@ -73,7 +71,7 @@ def test_several_bags_narrow_the_intervals(case):
 
 
 def test_values_are_recovered_with_a_controller_in_the_loop():
-    """The bag's command comes from the loop; the rig states the controller and the bag has the reference."""
+    """The bag's command comes from the loop that the rig states, and the bag has the reference."""
     nominal, true = bench("paper_high_impedance", 14)
     loop = PositionLoop(k_p=30.0, k_v=20.0)
     nominal, true = (replace(rig, controller=loop) for rig in (nominal, true))
@@ -84,7 +82,7 @@ def test_values_are_recovered_with_a_controller_in_the_loop():
         assert result.residual_rms[channel] < 1.3 * result.noise_rms[channel]
 
 
-def closed_loop(rig: Rig, seed: int) -> Record:
+def closed_loop(rig, seed):
     """Return what a bench logs while its controller follows a random reference."""
     n = int(20.0 * RATE)
     t = np.arange(n) * PERIOD
@@ -118,19 +116,17 @@ def test_nan_and_stamps_that_go_back_are_refused(case):
     t = record["ft"].t.copy()
     t[6] = t[4]
     with pytest.raises(IdentificationError, match=r"ft stamp 6 = .* expected rising stamps"):
-        identify([record.with_channels(ft=Channel(t, record["ft"].y))], load_rig("paper_high_impedance"))
+        identify([record.with_channels(ft=Channel(t, record["ft"].y))], nominal)
 
 
 @pytest.mark.parametrize("torque", [0.0, 10.0])
 def test_a_constant_torque_is_refused_in_words(torque):
     """It raised LinAlgError, or made a report that JSON cannot hold."""
     t = np.arange(2800) / 280.0
-    channels = {
-        name: Channel(t, np.full(len(t), value))
-        for name, value in (("command", torque), ("ft", torque), ("position", torque / 1530.0))
-    }
+    values = {"command": torque, "ft": torque, "position": torque / 1530.0}
+    record = Record({n: Channel(t, np.full(len(t), v)) for n, v in values.items()}, source="held")
     with pytest.raises(IdentificationError, match=f"is {torque:g} N·m throughout, expected an excitation"):
-        identify([Record(channels, source="held")], load_rig("paper_high_impedance"))
+        identify([record], RIG)
 
 
 def test_the_doubt_of_an_even_clock_is_in_the_intervals(case):
@@ -155,9 +151,8 @@ def test_stamps_of_commands_that_scatter_are_put_on_an_even_clock(case, clocks):
     rng = np.random.default_rng(12)
     off = {c: rng.uniform(-3e-4, 3e-4, len(record["command"])) for c in clocks}
     names = {n: n if n in ("command", "ft") else "joint" for n in record.channels}
-    scattered = {
-        n: Channel(c.t + off[names[n]], c.y) for n, c in record.channels.items() if names[n] in off
-    }
+    moved = {n: c for n, c in record.channels.items() if names[n] in off}
+    scattered = {n: Channel(c.t + off[names[n]], c.y) for n, c in moved.items()}
     result = identify([record.with_channels(**scattered)], nominal)
     assert result.verdict == "adequate"
     assert "command by 0.17 ms RMS" in remark_sentences(result.remarks)[0]

@@ -1,15 +1,14 @@
 """Sensors that are known to filter, on a bench in plain Python that shares no code with the simulation."""
 
-from __future__ import annotations
-
 import functools
 import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from runs import RATE, RIG
 
-import rsea_ros as rsea
+from rsea_ros import simulate
 from rsea_ros.checks.pairs import pairs_of
 from rsea_ros.diagnosis.data_split import as_often_as_commands
 from rsea_ros.identification.identify import identify
@@ -17,25 +16,19 @@ from rsea_ros.identification.noise_level import is_noise
 from rsea_ros.identification.problem import case_from
 from rsea_ros.model.rig import Sensor
 from rsea_ros.model.sensor_filter import SensorFilter
-from rsea_ros.model.simulation import simulate, synthesize
+from rsea_ros.model.simulation import simulate as outputs
 from rsea_ros.records.record import Channel, Record
 
-RATE, SUBSTEPS = 280.0, 40
+SUBSTEPS = 40
 POLE, RATIO = 0.036, 2000.0
 FT_NOISE, ANGLE_NOISE = 0.03, 3e-6
 K, J, B, B_S = 1592.0, 0.89, 27.7, 3.0
 TRUE = {
     "spring.stiffness": K, "rotor.reflected_inertia": J, "rotor.reflected_damping": B, "spring.damping": B_S,
 }  # fmt: skip
-RIG = rsea.load_rig("paper_high_impedance")
 PLAIN = replace(RIG, sensors={"ft": Sensor(noise=FT_NOISE), "deflection": Sensor(noise=ANGLE_NOISE)})
-KNOWN = replace(
-    PLAIN,
-    sensors={
-        "ft": Sensor(noise=FT_NOISE, filter=SensorFilter("one_pole", (POLE,))),
-        "deflection": Sensor(noise=ANGLE_NOISE, filter=SensorFilter("kalman", (RATIO,))),
-    },
-)
+FILTERS = {"ft": SensorFilter("one_pole", (POLE,)), "deflection": SensorFilter("kalman", (RATIO,))}
+KNOWN = replace(PLAIN, sensors={n: replace(s, filter=FILTERS[n]) for n, s in PLAIN.sensors.items()})
 
 
 class Kalman:
@@ -106,12 +99,11 @@ def test_noise_that_a_filter_has_coloured_is_noise(kind, numbers):
     """An average has lobes and a tracker a peak, as no other sensor; a wrong damping is no noise."""
     known = SensorFilter(kind, numbers)
     rig = replace(PLAIN, sensors={n: replace(s, filter=known) for n, s in PLAIN.sensors.items()})
-    command = Channel(np.arange(7000) / RATE, 15.0 * np.random.default_rng(7).standard_normal(7000))
-    record = synthesize(rig, command, seed=7)
-    case, made = case_from(record, rig), simulate(rig, record)
+    record = simulate(rig, 15.0 * np.random.default_rng(7).standard_normal(7000), RATE, seed=7)
+    case, made = case_from(record, rig), outputs(rig, record)
     assert all(is_noise(case, made, n) for n in rig.sensors)
     damping = "rotor.reflected_damping"
-    wrong = simulate(rig.with_values({damping: 1.01 * rig[damping]}), record)
+    wrong = outputs(rig.with_values({damping: 1.01 * rig[damping]}), record)
     assert not any(is_noise(case, wrong, n) for n in rig.sensors)
 
 

@@ -1,13 +1,12 @@
 """The noise floor of a channel as tables, and of simulated benches; a misfit never raises it."""
 
-from __future__ import annotations
-
 import math
 import warnings
 
 import numpy as np
 import pytest
 from benches import bench, record_bench
+from runs import RIG
 from scipy.signal import lfilter
 
 from rsea_ros import simulate
@@ -16,16 +15,11 @@ from rsea_ros.identification.noise import least_noise, noise_floor, step_of, top
 from rsea_ros.identification.noise_level import reestimate_noise
 from rsea_ros.identification.problem import case_from, simulate_cases
 from rsea_ros.identification.unknowns import Clocks
-from rsea_ros.model.rig import EffectSetting, Sensor
-from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.rig import Sensor
 from rsea_ros.records.record import Channel, Record
 
 RATE = 256.0
 """Hz; its period is exact."""
-
-
-def sensor(rms=0.0, quantum=0.0):
-    return Sensor(rms, quantum)
 
 
 def record(y, command=None, rate=RATE, command_rate=RATE):
@@ -33,12 +27,8 @@ def record(y, command=None, rate=RATE, command_rate=RATE):
     span = len(y) / rate
     if command is None:
         command = np.random.default_rng(99).normal(size=max(2, int(span * command_rate)))
-    return Record(
-        {
-            "command": Channel(np.arange(len(command)) / command_rate, command),
-            "ft": Channel(np.arange(len(y)) / rate, y),
-        }
-    )
+    commanded = Channel(np.arange(len(command)) / command_rate, command)
+    return Record({"command": commanded, "ft": Channel(np.arange(len(y)) / rate, y)})
 
 
 def white(size, rms=1.0, seed=0):
@@ -57,14 +47,14 @@ SECOND = 4.0 / math.sqrt(6.0)
 @pytest.mark.parametrize(
     ("y", "stated", "floor"),
     [
-        (alternate(2), sensor(), 1e-9),  # too few to say anything: rounding
-        (alternate(3), sensor(), 1e-9 * math.sqrt(8.0) / 3.0),
-        (alternate(3), sensor(0.25), 0.25),
-        (alternate(4), sensor(), SECOND),
-        (alternate(62), sensor(0.25), SECOND),
-        (alternate(62), sensor(2.0), 2.0),  # so few do not contradict the rig
-        (alternate(62), sensor(0.0, 12.0), 6.0),  # half a step of the rig's
-        (np.linspace(0.0, 9.0, 62), sensor(0.25), 0.25),  # a line has no noise
+        (alternate(2), Sensor(), 1e-9),  # too few to say anything: rounding
+        (alternate(3), Sensor(), 1e-9 * math.sqrt(8.0) / 3.0),
+        (alternate(3), Sensor(0.25), 0.25),
+        (alternate(4), Sensor(), SECOND),
+        (alternate(62), Sensor(0.25), SECOND),
+        (alternate(62), Sensor(2.0), 2.0),  # so few do not contradict the rig
+        (alternate(62), Sensor(0.0, 12.0), 6.0),  # half a step of the rig's
+        (np.linspace(0.0, 9.0, 62), Sensor(0.25), 0.25),  # a line has no noise
     ],
 )
 def test_a_short_channel_has_the_noise_of_its_second_differences(y, stated, floor):
@@ -73,30 +63,29 @@ def test_a_short_channel_has_the_noise_of_its_second_differences(y, stated, floo
 
 @pytest.mark.parametrize(("size", "short"), [(63, True), (64, False)])
 def test_from_64_samples_on_a_channel_has_a_spectrum(size, short):
-    floor = noise_floor(record(alternate(size)), "ft", sensor())
+    floor = noise_floor(record(alternate(size)), "ft", Sensor())
     assert (abs(floor - SECOND) < 0.1) == short
 
 
 @pytest.mark.parametrize(
     ("stated", "least"),
     [
-        (sensor(), 1e-9),
-        (sensor(2.0), 0.2),  # a tenth: what looks better was filtered
-        (sensor(0.0, 3.0), 1.5),  # half a step
-        (sensor(40.0, 3.0), 4.0),
+        (Sensor(), 1e-9),
+        (Sensor(2.0), 0.2),  # a tenth: what looks better was filtered
+        (Sensor(0.0, 3.0), 1.5),  # half a step
+        (Sensor(40.0, 3.0), 4.0),
     ],
 )
 def test_fine_values_have_a_least_noise(stated, least):
     assert least_noise(white(4000) / np.std(white(4000)), stated) == pytest.approx(least, rel=1e-6)
 
 
-@pytest.mark.parametrize(
-    ("quantum", "least"),
-    [(0.0, 1.0), (math.sqrt(12.0) - 1e-9, math.sqrt(3.0)), (1.0, 1.0), (4.0, 2.0)],
-)
+STEP = math.sqrt(12.0)
+
+
+@pytest.mark.parametrize(("quantum", "least"), [(0.0, 1.0), (STEP - 1e-9, STEP / 2), (1.0, 1.0), (4.0, 2.0)])
 def test_steps_coarser_than_the_rig_says_have_their_own_noise(quantum, least):
-    coarse = math.sqrt(12.0) * np.round(white(4000))
-    assert least_noise(coarse, sensor(0.0, quantum)) == pytest.approx(least)
+    assert least_noise(STEP * np.round(white(4000)), Sensor(0.0, quantum)) == pytest.approx(least)
 
 
 @pytest.mark.parametrize("rms", [0.1, 1.0, 30.0])
@@ -104,7 +93,7 @@ def test_white_noise_has_its_own_level(rms):
     y = white(2**15, rms)
     level, flat = top_of_band(y)
     assert flat and level == pytest.approx(rms, rel=0.03)
-    assert noise_floor(record(y), "ft", sensor()) == pytest.approx(rms, rel=0.03)
+    assert noise_floor(record(y), "ft", Sensor()) == pytest.approx(rms, rel=0.03)
 
 
 @pytest.mark.parametrize(
@@ -136,10 +125,10 @@ LOG = lfilter([0.25, 0.5, 0.25], [1.0], white(2**14))
 @pytest.mark.parametrize(
     ("y", "stated", "floor"),
     [
-        (white(2**14), sensor(5.0), 1.0),  # flat: what is measured counts, not what is stated
-        (white(2**14), sensor(20.0), 2.0),  # but no less than a tenth of that
-        (LOG, sensor(5.0), 5.0),  # not flat
-        (LOG, sensor(0.01), 0.095),
+        (white(2**14), Sensor(5.0), 1.0),  # flat: what is measured counts, not what is stated
+        (white(2**14), Sensor(20.0), 2.0),  # but no less than a tenth of that
+        (LOG, Sensor(5.0), 5.0),  # not flat
+        (LOG, Sensor(0.01), 0.095),
     ],
 )
 def test_the_noise_that_the_rig_states_counts_where_the_spectrum_is_not_flat(y, stated, floor):
@@ -149,13 +138,13 @@ def test_the_noise_that_the_rig_states_counts_where_the_spectrum_is_not_flat(y, 
 @pytest.mark.parametrize(
     ("rate", "stated", "floor"),
     [
-        (100.0, sensor(0.4), 0.4),  # the command's upper half is folded over it
-        (100.0, sensor(0.0, 1.2), 0.6),  # half a step: no model is asked for more
-        (100.0, sensor(0.3, 0.4), math.hypot(0.3, 0.4 / math.sqrt(12.0))),
-        (100.0, sensor(), 1.0),  # nothing is stated: what is measured
-        (224.0, sensor(0.4), 0.4),  # seven eighths of the command's rate
-        (240.0, sensor(0.4), 1.0),  # fifteen sixteenths
-        (512.0, sensor(0.4), 1.0),
+        (100.0, Sensor(0.4), 0.4),  # the command's upper half is folded over it
+        (100.0, Sensor(0.0, 1.2), 0.6),  # half a step: no model is asked for more
+        (100.0, Sensor(0.3, 0.4), math.hypot(0.3, 0.4 / math.sqrt(12.0))),
+        (100.0, Sensor(), 1.0),  # nothing is stated: what is measured
+        (224.0, Sensor(0.4), 0.4),  # seven eighths of the command's rate
+        (240.0, Sensor(0.4), 1.0),  # fifteen sixteenths
+        (512.0, Sensor(0.4), 1.0),
     ],
 )
 def test_a_channel_slower_than_the_command_has_the_noise_that_is_stated(rate, stated, floor):
@@ -167,12 +156,12 @@ def test_a_linear_response_to_the_command_is_not_noise(gain):
     command = white(2**15, seed=5)
     response = lfilter([0.0, gain], [1.0, -0.3], command)
     y = response + white(2**15, 0.1, seed=6)
-    assert noise_floor(record(y, command), "ft", sensor()) == pytest.approx(0.1, rel=0.06)
+    assert noise_floor(record(y, command), "ft", Sensor()) == pytest.approx(0.1, rel=0.06)
 
 
 def test_few_segments_do_not_make_noise_smaller():
     """In 15 segments a fourteenth of the noise agrees with any command by chance."""
-    floors = [noise_floor(record(white(1024, seed=k)), "ft", sensor()) for k in range(30)]
+    floors = [noise_floor(record(white(1024, seed=k)), "ft", Sensor()) for k in range(30)]
     alone = [top_of_band(white(1024, seed=k))[0] for k in range(30)]
     assert 0.98 < np.mean(floors) / np.mean(alone) < 1.05
 
@@ -239,17 +228,16 @@ def test_coloured_noise_of_a_clean_bench_is_noise(memory, channels):
 
 @pytest.mark.parametrize("duration", [8.0, 20.0])
 def test_white_noise_of_a_short_record_is_not_called_coloured(duration):
-    rig = load_rig("paper_high_impedance")
     for seed in range(10):
-        case = case_from(record_bench(rig, seed, duration), rig)
-        known = reestimate_noise(case, simulate_cases((case,), rig, Clocks({}, {}))[0][0])
+        case = case_from(record_bench(RIG, seed, duration), RIG)
+        known = reestimate_noise(case, simulate_cases((case,), RIG, Clocks({}, {}))[0][0])
         assert known.coloured == frozenset(), seed
 
 
 def test_a_broadband_misfit_is_not_taken_for_coloured_noise():
     nominal, true = bench("paper_high_impedance", 4)
-    stiction = EffectSetting("coulomb_friction", {"torque": 1.0, "creep_velocity": 0.02})
-    result = identify([with_coloured_noise(record_bench(true.with_effects(stiction), 4, 20.0), 0.9)], nominal)
+    worn = true.with_effect("coulomb_friction", torque=1.0, creep_velocity=0.02)
+    result = identify([with_coloured_noise(record_bench(worn, 4, 20.0), 0.9)], nominal)
     assert result.verdict == "misfit"
     assert result.coloured == ()
 
@@ -259,9 +247,8 @@ def test_states_slower_than_the_commands_have_the_noise_of_their_sensors():
     record = record_bench(true, 6, 20.0)
     full = identify([record], nominal)
     thin = np.searchsorted(record["position"].t, np.arange(0.02, 19.9, 0.01))
-    slow = {
-        n: Channel(record[n].t[thin], record[n].y[thin]) for n in ("position", "velocity", "motor_torque")
-    }
+    names = ("position", "velocity", "motor_torque")
+    slow = {n: Channel(record[n].t[thin], record[n].y[thin]) for n in names}
     result = identify([record.with_channels(**slow)], nominal)
     assert result.verdict == "adequate"
     for n in slow:
@@ -280,8 +267,7 @@ def test_a_short_channel_does_not_show_whether_its_noise_is_flat(size):
 @pytest.mark.parametrize("rest", [2.0, 6.0])
 def test_a_recording_that_begins_before_the_first_command_fits_as_well(rest):
     """1.15 and 1.37 times the noise: read off the whole channel, the rest before included."""
-    rig = load_rig("paper_high_impedance")
     torque = 15.0 * np.random.default_rng(1).standard_normal(1400)
-    run = simulate(rig, np.concatenate([np.zeros(int(280 * rest)), torque]), rate=280.0, seed=3)
+    run = simulate(RIG, np.concatenate([np.zeros(int(280 * rest)), torque]), rate=280.0, seed=3)
     run = run.with_channels(command=run["command"].between(rest - 1e-9, np.inf))
-    assert max(identify([run], rig).times_noise.values()) < 1.08
+    assert max(identify([run], RIG).times_noise.values()) < 1.08

@@ -1,61 +1,50 @@
 """Joints commanded by positions, identified in their loop: values, gains, and what is not determined."""
 
-from __future__ import annotations
-
-from collections.abc import Mapping
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
+from rsea_ros import simulate
 from rsea_ros.checks.check import check_record
 from rsea_ros.identification.excitation import JOINT, excitation
 from rsea_ros.identification.identify import identify
-from rsea_ros.identification.result import Identification
-from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.model.simulation import synthesize
-from rsea_ros.records.record import Channel, Record
 from rsea_ros.report.remark_words import remark_sentences
 
 TRUE = {
-    "rotor.reflected_inertia": 0.03,
-    "rotor.reflected_damping": 0.35,
-    "spring_end.gravity": 0.6,
+    "rotor.reflected_inertia": 0.03, "rotor.reflected_damping": 0.35, "spring_end.gravity": 0.6,
     "controller.k_p": 22.0,
-}
+}  # fmt: skip
 
 
-def run(rig: Rig, duration: float = 15.0) -> Record:
-    targets = excitation("chirp", replace(JOINT, duration=duration))
-    return synthesize(rig, Channel(np.arange(len(targets)) / JOINT.rate, targets), seed=4)
+def run(rig):
+    targets = excitation("chirp", replace(JOINT, duration=15.0))
+    return simulate(rig, targets, JOINT.rate, seed=4)
 
 
-def with_spread(rig: Rig, spreads: Mapping[str, float]) -> Rig:
+def doubted(rig, *names):
     """Return a rig of which some values are doubted."""
-    doubted = {n: replace(rig.quantities[n], spread=s) for n, s in spreads.items()}
-    return replace(rig, quantities={**rig.quantities, **doubted})
+    spread = {n: replace(rig.quantities[n], spread=0.3) for n in names}
+    return replace(rig, quantities={**rig.quantities, **spread})
 
 
-def rigid(rig: Rig) -> Rig:
-    """Return a joint with a rigid shaft and a known rotor inertia."""
-    kept = {n: q for n, q in rig.quantities.items() if n.split(".")[0] != "spring"}
-    return replace(rig, quantities=kept, rigid_spring=True)
-
-
-def value(result: Identification, name: str) -> tuple[float, float]:
+def value(result, name):
     """Return an estimate and its one sigma."""
     estimate = next(p for p in result.parameters if p.name == name)
     return estimate.value, (estimate.ci95[1] - estimate.ci95[0]) / 3.92
 
 
 @pytest.fixture(scope="module")
-def stiff() -> Rig:
-    return replace(rigid(load_rig("pd_joint")), known=frozenset({"gear.ratio", "spring_end.inertia"}))
+def stiff():
+    """Return a joint with a rigid shaft and a known rotor inertia."""
+    rig = load_rig("pd_joint")
+    kept = {n: q for n, q in rig.quantities.items() if n.split(".")[0] != "spring"}
+    known = frozenset({"gear.ratio", "spring_end.inertia"})
+    return replace(rig, quantities=kept, rigid_spring=True, known=known)
 
 
 def test_position_and_current_determine_the_values_and_a_doubted_gain(stiff):
-    nominal = with_spread(stiff, {"controller.k_p": 0.3})
+    nominal = doubted(stiff, "controller.k_p")
     result = identify([run(stiff.with_values(TRUE))], nominal)
     assert result.verdict == "adequate"
     for name, true in TRUE.items():
@@ -65,13 +54,8 @@ def test_position_and_current_determine_the_values_and_a_doubted_gain(stiff):
 
 
 def test_without_a_current_only_ratios_to_the_gains_are_determined(stiff):
-    free = {
-        "controller.k_p": 0.3,
-        "controller.k_d": 0.3,
-        "spring_end.inertia": 0.3,
-        "controller.torque_limit": 0.3,
-    }
-    nominal = replace(with_spread(stiff, free), known=frozenset({"gear.ratio"}))
+    free = ("controller.k_p", "controller.k_d", "spring_end.inertia", "controller.torque_limit")
+    nominal = replace(doubted(stiff, *free), known=frozenset({"gear.ratio"}))
     whole = run(stiff.with_values({n: v for n, v in TRUE.items() if n != "controller.k_p"}))
     only = replace(whole, channels={n: whole[n] for n in ("reference", "position")})
     result = identify([only], nominal)

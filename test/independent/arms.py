@@ -3,8 +3,6 @@
 They share no code with the package. A run is (t, command, stamps, channels with noise).
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

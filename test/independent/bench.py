@@ -1,10 +1,8 @@
 """The second bench: a command goes in, the record that this machine would have logged comes out.
 
 It stands in for a real bench in tests and benchmarks of the diagnosis. Its solver is Runge-Kutta 4 with
-24 steps a sample, checked against scipy.integrate.solve_ivp in test_bench.py.
+24 steps a sample; test_bench.py holds it against the model, effect by effect.
 """
-
-from __future__ import annotations
 
 import numpy as np
 from independent.equations import CURRENT, DC, DG, DH, C as CHASSIS, G as GEAR, H, sensor_torques

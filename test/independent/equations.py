@@ -10,8 +10,6 @@ T: motor torque less gear friction, T_gear: torque from the gear output on the c
 that is rigid with the gear output adds J_sc to the last element and T_gear is the spring's torque.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Commands of a test, N m, shape (n,), on a uniform grid: the paper's chirp with noise, and a multisine."""
 
-from __future__ import annotations
-
 import numpy as np
 
 RATE = 280.0

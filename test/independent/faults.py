@@ -1,7 +1,5 @@
 """Faults of recording, put into a finished record; each with the share of samples that it touches."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from rsea_ros.records.record import Channel, Record
@@ -73,16 +71,7 @@ def missing_topic(record, _rng):
     return Record(kept, record.source, record.epoch_ns)
 
 
-FAULTS = {
-    fault.__name__: fault
-    for fault in (
-        frozen_samples,
-        dropped_samples,
-        duplicate_stamps,
-        clock_jump,
-        outliers,
-        clipping,
-        nan,
-        missing_topic,
-    )
-}
+_KINDS = (
+    frozen_samples, dropped_samples, duplicate_stamps, clock_jump, outliers, clipping, nan, missing_topic
+)  # fmt: skip
+FAULTS = {fault.__name__: fault for fault in _KINDS}

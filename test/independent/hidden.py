@@ -1,7 +1,5 @@
 """Effects that can be hidden in the second bench, by name: those of the contract, and others."""
 
-from __future__ import annotations
-
 from types import MappingProxyType
 
 import numpy as np
@@ -11,28 +9,19 @@ CATALOGUE = MappingProxyType(
         "torque_constant_error": {"gain": "torque_gain"},
         "coulomb_friction": {"torque": "coulomb"},
         "stribeck_friction": {
-            "coulomb_torque": "coulomb",
-            "stribeck_torque": "stribeck",
-            "stribeck_velocity": "stribeck_v",
-        },
+            "coulomb_torque": "coulomb", "stribeck_torque": "stribeck", "stribeck_velocity": "stribeck_v"},
         "asymmetric_friction": {"offset": "friction_offset", "viscous_difference": "viscous_difference"},
         "load_dependent_friction": {"coefficient": "load_friction"},
         "backlash": {"gap": "gap"},
         "nonlinear_spring": {"cubic": "cubic"},
         "spring_hysteresis": {"torque": "bouc_wen", "angle": "bouc_wen_angle"},
         "structural_resonance": {
-            "frequency": "resonance_omega",
-            "damping_ratio": "resonance_zeta",
-            "participation": "resonance",
-        },
+            "frequency": "resonance_omega", "damping_ratio": "resonance_zeta", "participation": "resonance"},
         "command_delay": {"delay": "delay"},
         "current_loop_lag": {"time_constant": "current_tau"},
         "ft_sensor_lag": {"time_constant": "ft_tau"},
         "torque_ripple": {
-            "amplitude": "ripple",
-            "cycles_per_revolution": "ripple_cycles",
-            "phase": "ripple_phase",
-        },
+            "amplitude": "ripple", "cycles_per_revolution": "ripple_cycles", "phase": "ripple_phase"},
         "torque_saturation": {"limit": "saturation"},
         "ft_drift": {"drift": "ft_drift"},
         "ft_bias": {"bias": "ft_bias"},
@@ -44,7 +33,7 @@ CATALOGUE = MappingProxyType(
         "hard_stop": {"angle": "stop_angle", "stiffness": "stop_k"},
         "gear_compliance": {"stiffness": "gear_k"},
     }
-)
+)  # fmt: skip
 """Effect of the contract: its parameters, and the values of the bench that they are."""
 
 MAIN_PARAMETER = {name: next(iter(parameters)) for name, parameters in CATALOGUE.items()}
@@ -57,20 +46,11 @@ BESIDE_THE_CONTRACT = MappingProxyType(
         "torque_constant_drift": ({"relative_change": -0.2}, {"relative_change": "torque_fade"}),
         "lopsided_spring": ({"quadratic": 8.0}, {"quadratic": "quadratic"}),
         "lugre_friction": (
-            {
-                "coulomb_torque": 2.0,
-                "bristle_stiffness": 2500.0,
-                "stribeck_torque": 1.0,
-                "stribeck_velocity": 0.03,
-                "bristle_damping": 5.0,
-            },
-            {
-                "coulomb_torque": "lugre_coulomb",
-                "bristle_stiffness": "bristle_k",
-                "stribeck_torque": "lugre_stribeck",
-                "stribeck_velocity": "stribeck_v",
-                "bristle_damping": "bristle_b",
-            },
+            {"coulomb_torque": 2.0, "bristle_stiffness": 2500.0, "stribeck_torque": 1.0,
+             "stribeck_velocity": 0.03, "bristle_damping": 5.0},
+            {"coulomb_torque": "lugre_coulomb", "bristle_stiffness": "bristle_k",
+             "stribeck_torque": "lugre_stribeck", "stribeck_velocity": "stribeck_v",
+             "bristle_damping": "bristle_b"},
         ),
         "encoder_eccentricity": (
             {"amplitude": 8.0e-5, "cycles_per_revolution": 1.0},
@@ -81,11 +61,9 @@ BESIDE_THE_CONTRACT = MappingProxyType(
             {"time_constant": "current_time", "overshoot": "current_overshoot"},
         ),
         "ft_drift": (
-            {"drift": 1.0, "time_constant": 8.0},
-            {"drift": "ft_thermal", "time_constant": "ft_thermal_tau"},
-        ),
+            {"drift": 1.0, "time_constant": 8.0}, {"drift": "ft_thermal", "time_constant": "ft_thermal_tau"}),
     }
-)
+)  # fmt: skip
 """Effects of the catalogue that the contract's table lacks (and a drift that settles): medium parameters in
 the catalogue's units, and the values of the bench that they are."""
 

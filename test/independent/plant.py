@@ -4,8 +4,6 @@ This directory shares no code with rsea_ros/model or rsea_ros/effects: it is wri
 the facts and physics. Every `0.0` (or `inf`) below is an effect that is absent.
 """
 
-from __future__ import annotations
-
 from math import inf, nan
 from typing import NamedTuple
 
@@ -127,7 +125,7 @@ class Bench(NamedTuple):
     plant: Plant = Plant()
     outside: Outside = Outside()
 
-    def with_values(self, **values: float) -> Bench:
+    def with_values(self, **values):
         """Return the bench with other values, by the field names of Plant and Outside."""
         inner = {k: float(v) for k, v in values.items() if k in Plant._fields}
         outer = {k: float(v) for k, v in values.items() if k in Outside._fields}

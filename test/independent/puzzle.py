@@ -1,7 +1,5 @@
 """The paper's own puzzle (section 3.2.2): a moving output that goes "out of sync" around 19 Hz."""
 
-from __future__ import annotations
-
 import numpy as np
 from independent.bench import drawn_bench, record_run
 

@@ -1,7 +1,5 @@
 """How large a hidden effect is: mild, medium or strong, drawn from a seed."""
 
-from __future__ import annotations
-
 from types import MappingProxyType
 
 import numpy as np

@@ -1,15 +1,8 @@
-"""Two solvers for the same equations: a generic adaptive one (the reference) and a fast fixed-step one.
-
-Both start anew wherever the held command changes, also within a hold when the delay is not a whole
-number of samples.
-"""
-
-from __future__ import annotations
+"""Steps of Runge and Kutta's method, anew wherever the held command changes, also within a hold."""
 
 import numpy as np
 from independent.equations import SIZE, right_hand_side
 from numba import njit
-from scipy.integrate import solve_ivp
 
 
 def _pieces(delay: float, period: float) -> tuple[int, float]:
@@ -56,28 +49,4 @@ def run_fixed(command, knock, period, plant, steps=24):
     if plant.gap > 0.0 or plant.gear_k > 0.0:
         steps *= 3  # the chassis is light and its contact hard
     _march(command, knock, period, *_pieces(plant.delay, period), steps, plant, states, held)
-    return states, held
-
-
-def run_adaptive(command, knock, period, plant, method="LSODA", rtol=1e-9, atol=1e-11):
-    """Return the same by scipy.integrate.solve_ivp with a tight tolerance. Slow."""
-    whole, part = _pieces(plant.delay, period)
-    x, states, held = np.zeros(SIZE), np.empty((command.size, SIZE)), np.empty(command.size)
-
-    def advance(x, start, stop, u, w):
-        def rate(t, y):
-            dx = np.empty(SIZE)
-            right_hand_side(dx, t, y, u, w, plant)
-            return dx
-
-        return solve_ivp(rate, (start, stop), x, method=method, rtol=rtol, atol=atol).y[:, -1]
-
-    for k in range(command.size):
-        late = command[k - whole - 1] if k > whole else 0.0
-        now = command[k - whole] if k >= whole else 0.0
-        middle = (k + part) * period
-        if part > 0.0:
-            x = advance(x, k * period, middle, late, knock[k])
-        x = advance(x, middle, (k + 1) * period, now, knock[k])
-        states[k], held[k] = x, now
     return states, held

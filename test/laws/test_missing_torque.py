@@ -1,7 +1,5 @@
 """Input estimation within the stated doubt; a law is looked for above the noise floor and nowhere else."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -22,7 +20,7 @@ from rsea_ros.records.record import Channel
 from rsea_ros.report.law import headline
 
 
-def problem_with(extra: np.ndarray):
+def problem_with(extra):
     """Return the fit of a record in which a torque acted beside the logged command."""
     logged = command(280.0, 10.0)
     record = synthesize(RIG, Channel(logged.t, logged.y + extra), seed=2)
@@ -31,7 +29,7 @@ def problem_with(extra: np.ndarray):
     return problem, vector_of(problem.unknowns, RIG)
 
 
-def bump(t: np.ndarray) -> np.ndarray:
+def bump(t):
     return 1.5 * np.sin(2.0 * np.pi * 1.3 * t) * (np.sin(2.0 * np.pi * 0.2 * t) > 0.0)
 
 

@@ -1,7 +1,5 @@
 """Sums of products give the fits, losses and choices that the rows themselves give."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np
@@ -36,9 +34,7 @@ PRIOR = np.array([0.5, 60.0])
 
 
 def rows():
-    parts = {
-        (g, c): np.flatnonzero((g == GROUP) & (c == CHANNEL)) for g in range(EVERY) for c in (0, 1)
-    }
+    parts = {(g, c): np.flatnonzero((g == GROUP) & (c == CHANNEL)) for g in range(EVERY) for c in (0, 1)}
     return SimpleNamespace(
         residual=RESIDUAL, nominal=NOMINAL, channels=("ft", "position"), parts=parts, prior=PRIOR
     )

@@ -1,7 +1,5 @@
 """A term is the formula that people read, depends on what it says, and its unit makes a torque of it."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np
@@ -36,21 +34,21 @@ FUNCTIONS = {"abs": abs, "max": np.maximum, "pi": np.pi, "around": lambda x, a: 
 FUNCTIONS["min"] = np.minimum
 
 
-def variables() -> dict[str, np.ndarray]:
+def variables():
     """Return values of both signs, none near 0 where a gear creeps."""
     rng = np.random.default_rng(1)
     signed = {name: rng.uniform(0.1, 2.0, 60) * rng.choice([-1.0, 1.0], 60) for name in (*UNITS, "m")}
     return signed | {name: np.abs(signed[name]) for name in ("t", "share")}
 
 
-def size(unit: str, **scales: float) -> float:
+def size(unit, **scales):
     """Return how many times as large a number is, where the units are so many times as small."""
     text = unit.replace("N m", "N").replace(" ", "*").replace("^", "**")
     return float(eval(text, scales | {"Hz": 1.0 / scales["s"]}))
 
 
 @pytest.mark.parametrize("term", EVERY, ids=lambda t: f"{t.place}-{t.name}")
-def test_a_term_is_its_formula_in_the_units_of_its_place(term) -> None:
+def test_a_term_is_its_formula_in_the_units_of_its_place(term):
     at, shape = variables(), 0.61
     at["u"][np.abs(at["u"] / shape - 0.99) < 0.011] = 2.0  # a band ends within 2 % of its width
     text = term.equation
@@ -75,7 +73,7 @@ FREE = {"drift_drag", "drift_friction", "spread_friction", "wide_friction"}
 
 
 @pytest.mark.parametrize("term", GEAR_TERMS, ids=lambda t: t.name)
-def test_a_drag_takes_energy_whatever_the_signs_and_says_what_it_depends_on(term) -> None:
+def test_a_drag_takes_energy_whatever_the_signs_and_says_what_it_depends_on(term):
     at = variables()
     assert bool(term.memory) == ("past" in term.regressor)
     if not term.memory:

@@ -1,7 +1,5 @@
 """The file of a law is an effect like any other: it keeps the contract and loads from a folder."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -22,7 +20,6 @@ from rsea_ros.laws.terms import (
     GEAR_TERMS,
     SENSOR_TERMS,
     SPRING_TERMS,
-    Term,
     mode_terms,
     wave_terms,
 )  # fmt: skip
@@ -36,12 +33,12 @@ RANGES = {"w": 0.6, "q": 0.02, "theta": 10.0, "d": 0.02, "T": 30.0, "u": 24.0}
 NOTHING = Claims("velocity", "neither", None)
 
 
-def term(name: str) -> Term:
+def term(name):
     every = (*GEAR_TERMS, *COMMAND_TERMS, *SPRING_TERMS, *SENSOR_TERMS, *wave_terms(2.0))
     return next(t for t in every if t.name == name)
 
 
-def law(name: str, *parts: tuple[str, float, float]) -> Law:
+def law(name, *parts):
     made = tuple(FittedTerm(term(n), size, shape) for n, size, shape in parts)
     return Law(name, made[0].term.place, made[0].term.regressor, made, RANGES)
 
@@ -116,7 +113,7 @@ def test_a_learnt_curve_acts_as_its_points_say():
 
 
 @pytest.mark.parametrize("name", ["lagging", "delayed"])
-def test_a_memory_in_the_file_is_the_one_that_was_fitted(name: str):
+def test_a_memory_in_the_file_is_the_one_that_was_fitted(name):
     made = law("law_of_past", (name, 1.0, 5e-3))
     driven = drive(duration=2.0)
     with lend(effect_from(source_of(made, NOTHING, WHERE), made.name)):

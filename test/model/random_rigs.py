@@ -1,7 +1,5 @@
 """Rigs of every structure with random values, for property tests."""
 
-from __future__ import annotations
-
 import math
 
 from hypothesis import strategies as st
@@ -28,13 +26,13 @@ PROXIMAL = {
 END = {"inertia": (0.02, 1.0), "damping": (0.05, 1.0), "stiffness": (0.1, 20.0), "gravity": (0.1, 5.0)}
 
 
-def _between(bounds: tuple[float, float]) -> st.SearchStrategy[float]:
+def _between(bounds):
     low, high = (math.log10(b) for b in bounds)
     return st.floats(low, high).map(lambda exponent: 10.0**exponent)
 
 
 @st.composite
-def rigs(draw: st.DrawFn, *, gravity: bool = False) -> Rig:
+def rigs(draw, *, gravity=False):
     """Draw a rig without effects: ends clamped or free, spring rigid or not, gear stiff or
     not, a spring on the proximal side or not, any real train.
 

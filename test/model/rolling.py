@@ -3,12 +3,10 @@
 Shares nothing with rsea_ros.model.train: no ratio formula, only that two teeth in mesh move together.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 
-def rotor_speed(train: str, ratio: float, housing: float, output: float) -> float:
+def rotor_speed(train, ratio, housing, output):
     """Return the rotor's absolute speed for those of housing and gear output, rad/s."""
     match train:
         case "planetary":
@@ -26,7 +24,7 @@ def rotor_speed(train: str, ratio: float, housing: float, output: float) -> floa
     raise ValueError(train)
 
 
-def _sun(ratio: float, carrier: float, annulus: float) -> float:
+def _sun(ratio, carrier, annulus):
     """Sun of radius 1, annulus of radius N - 1, a planet between them on the carrier.
 
     At the sun:      w_s r_s = w_c (r_s + r_p) - v,      v = w_p r_p the planet's rim about its pin
@@ -38,7 +36,7 @@ def _sun(ratio: float, carrier: float, annulus: float) -> float:
     return float(np.linalg.solve(matrix, [pin, annulus * r_annulus - pin])[0])
 
 
-def _wave_generator(ratio: float, flexspline: float, circular_spline: float) -> float:
+def _wave_generator(ratio, flexspline, circular_spline):
     """Flexspline of 2 N teeth in a circular spline of two more, in mesh at the ellipse's long axis.
 
     The axis turns with the generator. As many teeth of either pass it: z_f (w_f - w) = z_c (w_c - w).

@@ -1,19 +1,15 @@
 """The slow and obvious computation: energies, states, held commands; no code of `rsea_ros.model`'s step."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
 from rolling import rotor_speed
 from scipy.linalg import expm
 
-from rsea_ros.model.rig import Rig
-
 MOVABLE = ("housing", "gear", "chassis", "distal", "proximal")
 
 
-def coordinates(rig: Rig) -> np.ndarray:
+def coordinates(rig):
     """Return the angles of the parts in MOVABLE by free coordinate, shape (5, n)."""
     names = ["gear"]
     names += ["chassis"] if math.isfinite(rig["gear.stiffness"]) else []
@@ -30,7 +26,7 @@ def coordinates(rig: Rig) -> np.ndarray:
     return np.array([[1.0 if follow[part] == name else 0.0 for name in names] for part in MOVABLE])
 
 
-def kinetic(rig: Rig, w: np.ndarray) -> float:
+def kinetic(rig, w):
     """Return the kinetic energy at speeds w of the parts in MOVABLE, J."""
     ratio = rig["gear.ratio"]
     rotor = rotor_speed(rig.train, ratio, w[0], w[1])
@@ -39,7 +35,7 @@ def kinetic(rig: Rig, w: np.ndarray) -> float:
     return 0.5 * (energy + sum(_end(rig, end, "inertia") * w[i] ** 2 for i, end in _ENDS))
 
 
-def dissipation(rig: Rig, w: np.ndarray) -> float:
+def dissipation(rig, w):
     """Return half the power lost, W."""
     inside = rig["rotor.reflected_damping"] * (w[1] - w[0]) ** 2 + rig["spring.damping"] * (w[2] - w[3]) ** 2
     inside += rig["gear.damping"] * (w[1] - w[2]) ** 2
@@ -47,7 +43,7 @@ def dissipation(rig: Rig, w: np.ndarray) -> float:
     return 0.5 * (inside + sum(_end(rig, end, "damping") * w[i] ** 2 for i, end in _ENDS))
 
 
-def potential(rig: Rig, q: np.ndarray, *, small_angles: bool = False) -> float:
+def potential(rig, q, *, small_angles=False):
     """Return the energy in springs and in gravity, J."""
     energy = 0.0 if rig.rigid_spring else 0.5 * rig["spring.stiffness"] * (q[2] - q[3]) ** 2
     if math.isfinite(rig["gear.stiffness"]):
@@ -63,11 +59,11 @@ def potential(rig: Rig, q: np.ndarray, *, small_angles: bool = False) -> float:
 _ENDS = ((4, "housing_end"), (3, "spring_end"))
 
 
-def _end(rig: Rig, end: str, key: str) -> float:
+def _end(rig, end, key):
     return 0.0 if end in rig.clamped else rig[f"{end}.{key}"]
 
 
-def quadratic(form, p: np.ndarray) -> np.ndarray:  # type: ignore[no-untyped-def]
+def quadratic(form, p):  # type: ignore[no-untyped-def]
     """Return A of form(P x) = 1/2 x' A x, by polarisation."""
     n = p.shape[1]
     basis = np.eye(n)
@@ -77,7 +73,7 @@ def quadratic(form, p: np.ndarray) -> np.ndarray:  # type: ignore[no-untyped-def
     )
 
 
-def state_matrices(rig: Rig) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def state_matrices(rig):
     """Return A, B (motor torque) and C (position, velocity, ft) of the small motions, from the energies."""
     p = coordinates(rig)
     mass = quadratic(lambda w: kinetic(rig, w), p)
@@ -99,7 +95,7 @@ def state_matrices(rig: Rig) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return a, b, c
 
 
-def respond(rig: Rig, stamps: np.ndarray, command: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+def respond(rig, stamps, command, wanted):
     """Return position, velocity, ft at the wanted times, shape (3, n): exact from event to event, no grid."""
     a, b, c = state_matrices(rig)
     n = len(b)
@@ -113,3 +109,19 @@ def respond(rig: Rig, stamps: np.ndarray, command: np.ndarray, wanted: np.ndarra
         x = steps[i, :n, :n] @ x + steps[i, :n, n] * u
         states[then] = x
     return c @ np.array([states[max(t, events[0])] for t in wanted]).T
+
+
+def closed_loop(rig, law, period, parts, count):
+    """Return position and velocity at the end of each of `count` periods, shape (2, count).
+
+    law: the torque of (period, position, velocity, step), held over the `parts` steps of a period.
+    """
+    a, b, c = state_matrices(rig)
+    n, step = len(b), period / parts
+    block = np.zeros((n + 1, n + 1))
+    block[:n, :n], block[:n, n] = a * step, b * step
+    phi, x, states = expm(block), np.zeros(n), []
+    for k in range(parts * count):
+        x = phi[:n, :n] @ x + phi[:n, n] * law(k / parts, c[0] @ x, c[1] @ x, step)
+        states.append(c[:2] @ x)
+    return np.array(states[parts - 1 :: parts]).T

@@ -1,20 +1,17 @@
 """The meaning of stamps: commands are held from theirs, channels are read at theirs, on the grid or not."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import slow
 from random_rigs import WITH_SPRING
+from runs import RATE, RIG
 
 from rsea_ros.errors import ChannelError, IdentificationError
 from rsea_ros.model.drive import LONGEST_STEP, coarser, drive_from, finer, steps_per_sample
-from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import simulate, simulate_drive
 from rsea_ros.records.record import Channel, Record
 
-RATE = 280.0
 SIGNALS = ("position", "velocity", "ft")
 
 
@@ -72,7 +69,7 @@ def test_after_a_dropped_command_the_last_one_is_held():
     wanted = stamps + 1 / RATE
     filled = command.copy()
     filled[[100, 101, 250]] = command[[99, 99, 249]]
-    rig = load_rig("paper_high_impedance")
+    rig = RIG
     dropped = simulate(rig, record_of(stamps[kept], command[kept], wanted))
     whole = simulate(rig, record_of(stamps, filled, wanted))
     for channel in SIGNALS:
@@ -82,7 +79,7 @@ def test_after_a_dropped_command_the_last_one_is_held():
 def test_the_first_and_the_last_state_go_on_outside_the_record():
     stamps = np.arange(50) / RATE
     wanted = np.array([-1.0, 0.0, 50 / RATE])
-    rig = load_rig("paper_high_impedance")
+    rig = RIG
     ours = simulate(rig, record_of(stamps, white(50), wanted))["position"]
     assert ours[0] == ours[1] == 0.0
     assert ours[2] == pytest.approx(slow.respond(rig, stamps, white(50), wanted[2:])[0, 0], rel=1e-9)
@@ -92,15 +89,8 @@ def test_an_encoder_that_starts_elsewhere_leaves_the_spring_alone():
     """Housing turned by 0.2 rad at the start: the pendulum's 1.4 N m on the spring, not 300 N m."""
     rig = load_rig("paper_moving_output")
     stamps = np.arange(50) / RATE
-    blank = {n: Channel(stamps.copy(), np.zeros(50)) for n in ("velocity", "ft")}
-    record = Record(
-        {
-            "command": Channel(stamps, np.zeros(50)),
-            "position": Channel(stamps.copy(), np.full(50, 0.2)),
-            **blank,
-        }
-    )
-    ours = simulate(rig, record)
+    record = record_of(stamps, np.zeros(50), stamps)
+    ours = simulate(rig, record.with_channels(position=Channel(stamps.copy(), np.full(50, 0.2))))
     assert ours["position"][0] == pytest.approx(0.2)
     assert abs(ours["ft"][0]) == pytest.approx(1.4, rel=0.02)
 
@@ -133,7 +123,7 @@ def test_a_record_without_a_command_is_refused():
 def test_a_coarser_drive_is_half_as_long_and_exact_for_a_linear_rig(shift, length):
     stamps = np.arange(length) / RATE
     drive = drive_from(record_of(stamps, white(length), stamps + (1 + shift) / RATE))
-    rig, coarse = load_rig("paper_high_impedance"), coarser(drive)
+    rig, coarse = RIG, coarser(drive)
     assert len(coarse.command) == len(drive.command) // 2
     fine, rough = simulate_drive(rig, drive), simulate_drive(rig, coarse)
     for n in SIGNALS:
@@ -151,7 +141,7 @@ def test_a_drive_whose_commands_change_within_longer_steps_is_left_as_it_is():
 
 
 def test_a_coarser_drive_has_four_times_the_error_of_friction():
-    rig = load_rig("paper_high_impedance").with_effects(EffectSetting("coulomb_friction", {"torque": 3.0}))
+    rig = RIG.with_effect("coulomb_friction", torque=3.0)
     stamps = np.arange(3000) / RATE
     record = record_of(stamps, white(3000), stamps + 1 / RATE)
     truth = simulate_drive(rig, drive_from(record, refine=8))
@@ -179,10 +169,8 @@ def test_a_motion_that_goes_on_is_dated_back_to_the_first_command():
     """The first sample comes a period after the first command: at 2 rad/s the joint was 7 mrad behind it."""
     stamps = np.arange(50) / RATE
     measured = stamps + 1 / RATE
-    motion = {
-        "position": Channel(measured, 0.5 + 2.0 * measured),
-        "velocity": Channel(measured.copy(), np.full(50, 2.0)),
-    }
+    position, velocity = 0.5 + 2.0 * measured, np.full(50, 2.0)
+    motion = {"position": Channel(measured, position), "velocity": Channel(measured.copy(), velocity)}
     drive = drive_from(Record({"command": Channel(stamps, np.zeros(50)), **motion}))
     assert drive.initial == pytest.approx((0.5, 2.0))
     late = {n: Channel(c.t + 5.0, c.y) for n, c in motion.items()}

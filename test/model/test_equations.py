@@ -1,7 +1,5 @@
 """Equations of motion against the energies of the parts."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,13 +1,10 @@
 """A position loop in the simulation, against scipy."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
 import pytest
 import slow
-from scipy.linalg import expm
 
 from rsea_ros.model.rig import PositionLoop
 from rsea_ros.model.rig_file import load_rig
@@ -27,30 +24,8 @@ def record_of(outside):
     """Return a record whose command has `outside` beside the measured motor torque."""
     motor = np.sin(T)
     blank = {n: Channel(STAMPS.copy(), np.zeros(len(T))) for n in ("position", "velocity")}
-    return Record(
-        {
-            "command": Channel(T, motor + outside),
-            "motor_torque": Channel(T.copy(), motor),
-            "reference": Channel(T.copy(), reference(T)),
-            **blank,
-        },
-        source="bag",
-    )
-
-
-def by_scipy(rig, controller, outside):
-    """Integrate with the loop's command held over a third of a millisecond, the step of the simulation."""
-    a, b, c = slow.state_matrices(rig)
-    n, step = len(b), 1 / RATE / 3
-    block = np.zeros((n + 1, n + 1))
-    block[:n, :n], block[:n, n] = a * step, b * step
-    phi, x, states = expm(block), np.zeros(n), []
-    for k in range(3 * len(T)):
-        wanted = np.interp(k * step, T, reference(T))
-        u = controller.k_v * (controller.k_p * (wanted - c[0] @ x) - c[1] @ x)
-        x = phi[:n, :n] @ x + phi[:n, n] * (np.clip(u, -controller.limit, controller.limit) + outside[k // 3])
-        states.append(x)
-    return c[:2] @ np.array(states[2::3]).T
+    given = {"command": motor + outside, "motor_torque": motor, "reference": reference(T)}
+    return Record({n: Channel(T.copy(), y) for n, y in given.items()} | blank, source="bag")
 
 
 @pytest.mark.parametrize(
@@ -63,9 +38,14 @@ def by_scipy(rig, controller, outside):
     ids=["tracking", "disturbed", "limited"],
 )
 def test_the_closed_loop_is_that_of_scipy(controller, outside):
+    def law(k, q, v, step):
+        wanted = np.interp(k / RATE, T, reference(T))
+        u = controller.k_v * (controller.k_p * (wanted - q) - v)
+        return np.clip(u, -controller.limit, controller.limit) + outside[int(k + 1e-9)]
+
     rig = replace(load_rig("bare_drive"), controller=controller)
-    ours = simulate(rig, record_of(outside))
-    for channel, expected in zip(("position", "velocity"), by_scipy(rig, controller, outside), strict=True):
+    ours, true = simulate(rig, record_of(outside)), slow.closed_loop(rig, law, 1 / RATE, 3, len(T))
+    for channel, expected in zip(("position", "velocity"), true, strict=True):
         np.testing.assert_allclose(ours[channel], expected, rtol=0, atol=1e-9 * np.abs(expected).max())
 
 

@@ -1,21 +1,10 @@
 """A measured motion and the torque that it takes, beside the sine and the equation of motion put in."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
 from rsea_ros.errors import IdentificationError
-from rsea_ros.model.inverse import (
-    Motion,
-    _finite,
-    _sampled_spans,
-    _torque_at,
-    acting_torque,
-    motion_from,
-    smooth,
-    torques_along,
-)
+from rsea_ros.model import inverse
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.records.record import Channel, Record
@@ -37,7 +26,7 @@ def sine(t):
 def test_a_motion_is_the_angle_its_rates_and_the_torque_of_its_instants():
     record = Record({"position": channel(sine(T)[0]), "command": channel(3.0 * np.cos(W * T)),
                      "motor_torque": channel(2.0 * np.cos(W * T))})  # fmt: skip
-    motion = motion_from(record)
+    motion = inverse.motion_from(record)
     assert motion.t == pytest.approx(T) and not motion.commanded
     inside = motion.counts
     assert inside.any() and not inside[0] and not inside[-1]
@@ -46,7 +35,7 @@ def test_a_motion_is_the_angle_its_rates_and_the_torque_of_its_instants():
     for given, true in zip((motion.q, motion.v, motion.a), sine(T), strict=True):
         assert given[inside] == pytest.approx(true[inside], abs=5e-3 * np.max(np.abs(true)))
     assert motion.torque[inside] == pytest.approx(2.0 * np.cos(W * T)[inside], abs=0.01)
-    asked = motion_from(Record({n: record[n] for n in ("position", "command")}))
+    asked = inverse.motion_from(Record({n: record[n] for n in ("position", "command")}))
     held = 3.0 * np.cos(W * (T - 0.005))  # the mean of the holds on either side of a stamp
     assert asked.commanded and asked.torque[inside] == pytest.approx(held[inside], abs=0.02)
 
@@ -55,7 +44,7 @@ def test_a_gap_is_a_line_and_does_not_count_and_what_is_no_number_is_left_out():
     known = (T < 4.0) | (T > 4.8)
     q = sine(T)[0]
     record = Record({"position": channel(q[known], T[known]), "command": channel(np.cos(W * T))})
-    motion = motion_from(record)
+    motion = inverse.motion_from(record)
     between = (motion.t > 4.0) & (motion.t < 4.8)
     assert not motion.counts[between].any()
     before, after = motion.counts & (motion.t < 4.0), motion.counts & (motion.t > 4.8)
@@ -65,13 +54,13 @@ def test_a_gap_is_a_line_and_does_not_count_and_what_is_no_number_is_left_out():
     assert motion.q[between][2:-2] == pytest.approx(line[2:-2], abs=1e-6)
     assert not motion.v[between][2:-2].any()
     odd = np.where(np.arange(1000) == 300, np.nan, q)
-    spoiled = _finite(Record({"position": channel(odd), "motor_torque": channel(np.full(1000, np.nan)),
-                              "command": channel(odd)}))  # fmt: skip
+    channels = {"position": odd, "motor_torque": np.full(1000, np.nan), "command": odd}
+    spoiled = inverse._finite(Record({n: channel(y) for n, y in channels.items()}))
     assert {n: len(c) for n, c in spoiled.channels.items()} == {"position": 999, "command": 1000}
     with pytest.raises(IdentificationError, match="no position"):
-        motion_from(Record({"command": channel(q)}))
+        inverse.motion_from(Record({"command": channel(q)}))
     with pytest.raises(IdentificationError, match="has 9 samples"):
-        motion_from(Record({"position": channel(q[:9], T[:9]), "command": channel(q)}))
+        inverse.motion_from(Record({"position": channel(q[:9], T[:9]), "command": channel(q)}))
 
 
 def test_spans_lie_between_the_gaps_of_motion_and_torque():
@@ -82,40 +71,40 @@ def test_spans_lie_between_the_gaps_of_motion_and_torque():
         return channel(T[keep], T[keep])
 
     record = Record({"position": at((3.0, 3.5)), "motor_torque": at((6.0, 6.5)), "command": at((1.0, 2.0))})
-    spans = _sampled_spans(record, 0.0, 9.99)
+    spans = inverse._sampled_spans(record, 0.0, 9.99)
     assert [x for span in spans for x in span] == pytest.approx([0.0, 3.0, 3.5, 6.0, 6.5, 9.99])
     short = Record({"position": at((3.0, 3.5), (3.7, 4.2))})
-    spans = _sampled_spans(short, 0.0, 9.99)
+    spans = inverse._sampled_spans(short, 0.0, 9.99)
     assert [x for span in spans for x in span] == pytest.approx([0.0, 3.0, 4.2, 9.99])
-    assert _sampled_spans(Record({"position": channel(T)}), 0.0, 0.1) == [(0.0, 0.1)]
+    assert inverse._sampled_spans(Record({"position": channel(T)}), 0.0, 0.1) == [(0.0, 0.1)]
 
 
 def test_the_torque_at_an_edge_is_the_mean_of_both_holds():
     command = channel([1.0, 3.0, -5.0, 7.0], np.arange(4.0))
     run = Record({"command": command})
-    assert acting_torque(run) is command
+    assert inverse.acting_torque(run) is command
     at = np.array([-0.5, 0.5, 1.0, 1.5, 2.0, 3.5])
-    assert _torque_at(run, at) == pytest.approx([1.0, 1.0, 2.0, 3.0, -1.0, 7.0])
+    assert inverse._torque_at(run, at) == pytest.approx([1.0, 1.0, 2.0, 3.0, -1.0, 7.0])
     ended = Record({"command": command, "motor_torque": channel([1.1, 3.1, -5.1], np.arange(1.0, 4.0))})
-    assert acting_torque(ended) is ended["motor_torque"]
-    assert _torque_at(ended, at[1:5]) == pytest.approx([1.1, 2.1, 3.1, -1.0])
+    assert inverse.acting_torque(ended) is ended["motor_torque"]
+    assert inverse._torque_at(ended, at[1:5]) == pytest.approx([1.1, 2.1, 3.1, -1.0])
     begun = Record({"command": command, "motor_torque": channel([1.1, 3.1, -5.1, 7.1], np.arange(4.0))})
-    assert _torque_at(begun, at[1:4]) == pytest.approx([2.1, 3.1, -1.0])
+    assert inverse._torque_at(begun, at[1:4]) == pytest.approx([2.1, 3.1, -1.0])
 
 
 def test_a_filter_run_both_ways_delays_nothing():
     x = np.sin(W * T)
-    assert smooth(x, 0.01)[200:-200] == pytest.approx(x[200:-200], abs=1e-3)
-    assert np.max(np.abs(smooth(np.sin(2.0 * np.pi * 45.0 * T), 0.01)[200:-200])) < 0.35
+    assert inverse.smooth(x, 0.01)[200:-200] == pytest.approx(x[200:-200], abs=1e-3)
+    assert np.max(np.abs(inverse.smooth(np.sin(2.0 * np.pi * 45.0 * T), 0.01)[200:-200])) < 0.35
 
 
 def motion(**changes):
     q, v, a = sine(T)
-    return Motion(T, q, v, a, np.zeros(1000), np.ones(1000, bool), **changes)
+    return inverse.Motion(T, q, v, a, np.zeros(1000), np.ones(1000, bool), **changes)
 
 
 def taken(rig, **changes):
-    return torques_along(rig, motion(**changes))["motor_torque"][200:-200]
+    return inverse.torques_along(rig, motion(**changes))["motor_torque"][200:-200]
 
 
 def test_the_torque_of_a_motion_is_that_of_the_equation_of_motion():
@@ -126,7 +115,7 @@ def test_the_torque_of_a_motion_is_that_of_the_equation_of_motion():
     rig = RIG.with_values(values)
     inertia = rig["rotor.reflected_inertia"] + rig["chassis.inertia"] + 0.3
     linear = inertia * a + (rig["rotor.reflected_damping"] + 0.2) * v + 4.0 * q
-    expected = linear + smooth(6.0 * np.sin(sine(T)[0] + 0.4), 0.01)[200:-200]
+    expected = linear + inverse.smooth(6.0 * np.sin(sine(T)[0] + 0.4), 0.01)[200:-200]
     assert taken(rig) == pytest.approx(expected, abs=1e-6)
     rubbed = taken(rig.with_effects(EffectSetting("coulomb_friction", {"torque": 2.0})))
     assert np.mean((rubbed - expected) * np.sign(v)) == pytest.approx(2.0, rel=0.1)
@@ -134,4 +123,4 @@ def test_the_torque_of_a_motion_is_that_of_the_equation_of_motion():
     assert taken(weak) == pytest.approx(expected / 0.8, abs=1e-6)
     assert taken(rig, commanded=True) == pytest.approx(expected, abs=1e-6)
     with pytest.raises(IdentificationError, match="moving parts, expected one"):
-        torques_along(load_rig("paper_moving_output"), motion())
+        inverse.torques_along(load_rig("paper_moving_output"), motion())

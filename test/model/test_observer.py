@@ -1,7 +1,5 @@
 """The observer on simulated benches: its stated uncertainty holds for samples in any order and rhythm."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -15,7 +13,7 @@ from bench.observer.truth import true_run
 from rsea_ros.errors import RigError
 from rsea_ros.model.observer import Observer, noise_of, observe
 from rsea_ros.model.observer.transition import transition
-from rsea_ros.model.rig import EffectSetting, Sensor
+from rsea_ros.model.rig import Sensor
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.paper.rival_models import lumped_rig
 
@@ -116,10 +114,8 @@ def test_without_ft_the_doubt_grows_and_its_return_is_no_surprise(moving):
 
 def test_the_innovation_test_names_the_channel_and_passes_a_right_model(moving):
     rig = load_rig("paper_moving_output")
-    right, wrong = (
-        Observer(rig),
-        Observer(rig.with_values({"spring.stiffness": 0.9 * rig["spring.stiffness"]})),
-    )
+    softer = rig.with_values({"spring.stiffness": 0.9 * rig["spring.stiffness"]})
+    right, wrong = Observer(rig), Observer(softer)
     for observer in (right, wrong):
         observe(observer, moving.record)
     assert not any(channel.broken for channel in right.consistency().values())
@@ -167,8 +163,7 @@ def test_samples_that_no_sensor_gives_leave_no_trace(moving):
 
 def test_a_drive_that_does_not_follow_its_command_is_believed_for_its_current():
     rig = load_rig("paper_high_impedance")
-    limited = rig.with_effects(EffectSetting("torque_saturation", {"limit": 4.0}))
-    truth = true_run(limited, chirp(3.0), RATE, seed=2)
+    truth = true_run(rig.with_effect("torque_saturation", limit=4.0), chirp(3.0), RATE, seed=2)
     observer = Observer(rig)
     _, estimates = observe(observer, truth.record)
     assert observer.consistency()["motor_torque"].broken

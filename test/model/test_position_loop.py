@@ -1,18 +1,15 @@
 """Joints commanded by positions: the loop in the simulated step, against scipy and against its purpose."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
 import pytest
 import slow
-from scipy.linalg import expm
 
 from rsea_ros.errors import ChannelError, RigError
 from rsea_ros.identification.frequency_response import model_response
 from rsea_ros.model.position_loop import with_command
-from rsea_ros.model.rig import Quantity, Rig
+from rsea_ros.model.rig import Quantity
 from rsea_ros.model.rig_document import rig_from_document
 from rsea_ros.model.rig_file import load_rig, rig_to_document
 from rsea_ros.model.simulation import simulate, synthesize
@@ -24,39 +21,27 @@ PD, STIFF = {"k_p": 60.0, "k_d": 2.0}, {"value": 60.0, "unit": "N m/rad"}
 STEPPING = np.where(T < 0.5, 0.0, np.where(T < 1.2, 0.3, -0.2))
 
 
-def joint(kind: str = "pd", **values: float) -> Rig:
+def joint(kind="pd", **values):
     """Return a rigid joint in a position loop."""
-    rig = replace(load_rig("bare_drive"), loop=kind, quantities=rigid_quantities(kind))
-    return rig.with_values({f"controller.{n}": v for n, v in values.items()})
-
-
-def rigid_quantities(kind: str) -> dict[str, Quantity]:
     gains = {"p": {"k_p": 60.0}, "mit": PD, "pd": PD, "cascade": {"k_pos": 8.0, "k_v": 6.0}}[kind]
     rig = load_rig("bare_drive").with_values(
         {"rotor.reflected_inertia": 0.05, "rotor.reflected_damping": 0.8, "spring_end.inertia": 0.03}
     )
-    return {**rig.quantities, **{f"controller.{n}": Quantity(v) for n, v in gains.items()}}
+    quantities = {**rig.quantities, **{f"controller.{n}": Quantity(v) for n, v in gains.items()}}
+    rig = replace(rig, loop=kind, quantities=quantities)
+    return rig.with_values({f"controller.{n}": v for n, v in values.items()})
 
 
-def move_rig(rig: Rig, targets=STEPPING, **options) -> dict[str, np.ndarray]:
+def move_rig(rig, targets=STEPPING, **options):
     """Return what a rig does for targets, at the end of each hold."""
     blank = {n: Channel(T + 1 / RATE, np.zeros(len(T))) for n in ("position", "velocity", "motor_torque")}
     return simulate(rig, Record({"reference": Channel(T, targets), **blank}, source="joint"), **options)
 
 
-def by_scipy(rig: Rig, law, targets=STEPPING) -> np.ndarray:
-    """Integrate with the loop's torque held over the simulation's step: position at the end of each hold."""
-    a, b, c = slow.state_matrices(rig)
-    n, parts = len(b), 5
-    step = 1 / RATE / parts
-    block = np.zeros((n + 1, n + 1))
-    block[:n, :n], block[:n, n] = a * step, b * step
-    phi, x, states = expm(block), np.zeros(n), []
-    for k in range(parts * len(T)):
-        u = law(targets[k // parts], c[0] @ x, c[1] @ x, step)
-        x = phi[:n, :n] @ x + phi[:n, n] * u
-        states.append(c[0] @ x)
-    return np.array(states[parts - 1 :: parts])
+def by_scipy(rig, law, targets=STEPPING):
+    """Return the position at the end of each hold; law: the torque of target, position, velocity and step."""
+    of_target = lambda k, *state: law(targets[int(k + 1e-9)], *state)  # noqa: E731
+    return slow.closed_loop(rig, of_target, 1 / RATE, 5, len(T))[0]
 
 
 @pytest.mark.parametrize("kind", ["pd", "cascade"])
@@ -91,9 +76,8 @@ def test_an_integral_takes_away_what_gravity_pulls_and_does_not_wind_up():
     still = np.full(len(T), 0.0)
     sag = move_rig(hanging, still)["position"][-1]
     assert 60.0 * -sag == pytest.approx(3.0 * np.sin(0.5 + sag), rel=1e-3)
-    assert abs(move_rig(hanging.with_values({"controller.k_i": 300.0}), still)["position"][-1]) < 0.1 * abs(
-        sag
-    )
+    held = move_rig(hanging.with_values({"controller.k_i": 300.0}), still)["position"][-1]
+    assert abs(held) < 0.1 * abs(sag)
     weak = hanging.with_values({"controller.k_i": 300.0, "controller.torque_limit": 6.0})
     assert np.max(move_rig(weak)["position"]) < 0.4
 
@@ -106,18 +90,13 @@ def test_a_delay_delays_the_target_not_the_torque_in_the_loop():
 
 
 def test_the_encoder_may_sit_behind_the_play():
-    before = (
-        load_rig("pd_joint").with_effect("backlash", gap=0.02).with_effect("coulomb_friction", torque=0.1)
-    )
-    behind = replace(before, encoder_end="spring_end")
-    slow_swing = 0.4 * np.sin(2 * np.pi * T)
-    lost = {
-        rig.encoder_end: np.ptp(
-            move_rig(rig, slow_swing)["position"] - move_rig(rig.with_effects(), slow_swing)["position"]
-        )
-        for rig in (before, behind)
-    }
-    assert lost["spring_end"] > 2.0 * lost["gear_output"]
+    worn = load_rig("pd_joint").with_effect("backlash", gap=0.02).with_effect("coulomb_friction", torque=0.1)
+
+    def lost(rig):
+        moved = (move_rig(r, 0.4 * np.sin(2 * np.pi * T))["position"] for r in (rig, rig.with_effects()))
+        return np.ptp(np.subtract(*moved))
+
+    assert lost(replace(worn, encoder_end="spring_end")) > 2.0 * lost(worn)
 
 
 def test_a_mit_frame_asks_for_an_angle_a_speed_and_a_torque():
@@ -149,9 +128,8 @@ def test_the_linear_response_is_that_of_the_simulation(kind):
     wave = np.exp(-2j * np.pi * f * (T + 1 / RATE))[200:]
     hold = np.exp(-1j * np.pi * f / RATE) * np.sinc(f / RATE)
     measured = 2j * np.mean(position[200:] * wave) / 0.1
-    assert measured == pytest.approx(
-        complex(model_response(rig, "position", np.array([f]))[0] * hold), rel=0.02
-    )
+    expected = complex(model_response(rig, "position", np.array([f]))[0] * hold)
+    assert measured == pytest.approx(expected, rel=0.02)
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,5 @@
 """The flag measures |T_p - T_d| against |T_d|: against a dense sum, over kinds of torque, and its edge."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,21 +1,17 @@
 """Gaps of a record: the simulation begins anew behind them, and the filter smears them over nothing."""
 
-from __future__ import annotations
-
 import functools
 
 import numpy as np
 import pytest
+from runs import RIG, excited
 
 import rsea_ros as rsea
 from rsea_ros.checks.faults import check
-from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.model import inverse
-from rsea_ros.model.rig_file import load_rig
 from rsea_ros.records.holds import lost_commands
 from rsea_ros.records.record import Channel, Record
 
-RIG = load_rig("paper_high_impedance")
 SOUND = rsea.simulate(RIG, 15.0 * np.random.default_rng(1).standard_normal(4200), rate=280.0, seed=1)
 
 
@@ -125,16 +121,14 @@ def test_commands_that_are_no_numbers_are_lost_ones():
 
 @functools.cache
 def whole():
-    settings = ExcitationSettings(duration=20.0, amplitude=10.0, noise=2.0)
-    return rsea.simulate("pendulum", excitation("chirp", settings), 280.0, seed=3)
+    return excited("pendulum", "chirp", sensors=3, duration=20.0, amplitude=10.0, noise=2.0)
 
 
 def missing(seconds, *names):
     """Return the run without the samples of some channels from 8 s on."""
     left_out = {n: (c.t >= 8.0) & (c.t < 8.0 + seconds) for n in names for c in [whole()[n]]}
-    return whole().with_channels(
-        **{n: Channel(whole()[n].t[~out], whole()[n].y[~out]) for n, out in left_out.items()}
-    )
+    kept = {n: Channel(whole()[n].t[~out], whole()[n].y[~out]) for n, out in left_out.items()}
+    return whole().with_channels(**kept)
 
 
 ALL = ("command", "position", "velocity", "motor_torque")
@@ -158,10 +152,9 @@ def test_a_gap_changes_no_result(seconds, names):
 @pytest.mark.parametrize("off", [0.0, 4e-10, -4e-10])
 def test_stamps_rounded_to_nanoseconds_change_no_prediction(off):
     """The same run as a bag and as arrays: an RMS of 0.21 and 0.91 N m."""
-    rounded = {
-        n: Channel(np.round(c.t, 9) + off * (n == "command"), c.y) for n, c in whole().channels.items()
-    }
-    predicted = rsea.predict("pendulum", whole().with_channels(**rounded))["motor_torque"]
+    stamps = {n: np.round(c.t, 9) + off * (n == "command") for n, c in whole().channels.items()}
+    rounded = Record({n: Channel(t, whole()[n].y) for n, t in stamps.items()})
+    predicted = rsea.predict("pendulum", rounded)["motor_torque"]
     sound = rsea.predict("pendulum", whole())["motor_torque"]
     assert predicted.rms_error == pytest.approx(sound.rms_error, rel=1e-3)
     assert predicted.fit_percent > 95.0

@@ -1,7 +1,5 @@
 """Nonsense in a rig file is refused in one line with file, line, field, value and expectation."""
 
-from __future__ import annotations
-
 import copy
 
 import pytest
@@ -29,6 +27,22 @@ def change(path, value):
     else:
         place[last] = value
     return document
+
+
+@pytest.fixture
+def refusal(tmp_path):
+    """Return a function that reads a file with some content and returns what refuses it, without the path."""
+    file = tmp_path / "bad.yaml"
+
+    def read(content):
+        file.write_bytes(content)
+        with pytest.raises(RigError) as refused:
+            load_rig(file)
+        text = str(refused.value)
+        assert text.startswith(f"{file}: ") and "\n" not in text
+        return text.removeprefix(f"{file}: ")
+
+    return read
 
 
 DELETE = object()
@@ -89,13 +103,8 @@ NONSENSE = [
 @pytest.mark.parametrize(
     ("path", "value", "message"), NONSENSE, ids=lambda item: "deleted" if item is DELETE else str(item)[:40]
 )
-def test_nonsense_is_refused_in_one_line_that_names_it(path, value, message, tmp_path):
-    file = tmp_path / "bad.yaml"
-    file.write_text(yaml.safe_dump(change(path, value)))
-    with pytest.raises(RigError) as error:
-        load_rig(file)
-    text = str(error.value)
-    assert text.startswith(f"{file}: ") and message in text and "\n" not in text
+def test_nonsense_is_refused_in_one_line_that_names_it(path, value, message, refusal):
+    assert message in refusal(yaml.safe_dump(change(path, value)).encode())
 
 
 @pytest.mark.parametrize(
@@ -108,12 +117,8 @@ def test_nonsense_is_refused_in_one_line_that_names_it(path, value, message, tmp
     ],
     ids=["empty", "broken", "binary", "object"],
 )
-def test_a_file_that_is_not_a_rig_is_refused(content, message, tmp_path):
-    file = tmp_path / "bad.yaml"
-    file.write_bytes(content)
-    with pytest.raises(RigError) as error:
-        load_rig(file)
-    assert str(error.value).startswith(f"{file}: {message}") and "\n" not in str(error.value)
+def test_a_file_that_is_not_a_rig_is_refused(content, message, refusal):
+    assert refusal(content).startswith(message)
 
 
 def test_a_file_that_does_not_exist_is_refused(tmp_path):
@@ -153,14 +158,11 @@ LINES = {
 
 
 @pytest.mark.parametrize("old", LINES)
-def test_a_mistake_is_named_with_its_line(old, tmp_path):
+def test_a_mistake_is_named_with_its_line(old, refusal):
     new, message = LINES[old]
     assert TEXT.count(old) == 1
-    (tmp_path / "rig.yaml").write_text(TEXT.replace(old, new))
-    with pytest.raises(RigError) as caught:
-        load_rig(tmp_path / "rig.yaml")
     line = TEXT[: TEXT.index(old)].count("\n") + 1
-    assert str(caught.value).startswith(f"{tmp_path}/rig.yaml: line {line}: {message}")
+    assert refusal(TEXT.replace(old, new).encode()).startswith(f"line {line}: {message}")
 
 
 BAD_EFFECTS = [
@@ -169,20 +171,12 @@ BAD_EFFECTS = [
     ("backlash", "{width: 1}", "line 26: effect backlash: unknown parameter 'width', expected gap"),
     ("backlash", "{}", "line 26: effect backlash: parameter 'gap' is missing"),
     ("warp", "{}", "line 26: effect 'warp': not in the catalogue"),
-]
+    ("backlash", "{gap: 0.001}\n- {name: backlash, parameters: {gap: 0.001}}",
+     "line 27: effect backlash is given twice, expected once"),
+]  # fmt: skip
 
 
 @pytest.mark.parametrize(("name", "parameters", "message"), BAD_EFFECTS)
-def test_effects_of_a_rig_are_checked(name, parameters, message, tmp_path):
+def test_effects_of_a_rig_are_checked(name, parameters, message, refusal):
     text = f"{TEXT}effects:\n- name: {name}\n  parameters: {parameters}\n"
-    (tmp_path / "rig.yaml").write_text(text)
-    with pytest.raises(RigError) as caught:
-        load_rig(tmp_path / "rig.yaml")
-    assert str(caught.value).startswith(f"{tmp_path}/rig.yaml: {message}")
-
-
-def test_an_effect_stands_once_in_a_rig(tmp_path):
-    effect = "- {name: backlash, parameters: {gap: 0.001}}\n"
-    (tmp_path / "rig.yaml").write_text(f"{TEXT}effects:\n{effect}{effect}")
-    with pytest.raises(RigError, match=r"line 26: effect backlash is given twice, expected once"):
-        load_rig(tmp_path / "rig.yaml")
+    assert refusal(text.encode()).startswith(message)

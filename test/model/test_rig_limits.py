@@ -1,7 +1,5 @@
 """Limits that nobody states are the smallest that rig, motor and sensor give; a stated one has a bound."""
 
-from __future__ import annotations
-
 import math
 
 import pytest
@@ -27,7 +25,7 @@ SOURCES = {
 }
 
 
-def stopped(angle: float):
+def stopped(angle):
     return RIG.with_effects(EffectSetting("hard_stop", {"angle": angle, "stiffness": 1e4, "damping": 1.0}))
 
 
@@ -46,7 +44,7 @@ def stopped(angle: float):
         ({"velocity": 1.5, "ft": 7.0}, RIG, {}, (FIVE, MOTOR, 1.5, 7.0), NAMES[:2]),
     ],
 )
-def test_a_limit_is_the_smallest_that_anything_gives(stated, rig, rating, limits, derived) -> None:
+def test_a_limit_is_the_smallest_that_anything_gives(stated, rig, rating, limits, derived):
     found, sources = derive(stated, rig, rating)
     assert tuple(found[name] for name in NAMES) == pytest.approx(limits) and set(sources) == set(derived)
     for name in derived:
@@ -59,14 +57,14 @@ def test_a_limit_is_the_smallest_that_anything_gives(stated, rig, rating, limits
     [("torque", {"torque": 20.0}, 20.0), ("ft", {"ft": 60.0}, 60.0), ("velocity", {"velocity": 1.0}, 3.0),
      ("velocity", {}, 3.0 * MOTOR / B), ("deflection", {}, 3.0 * MOTOR / K)],
 )  # fmt: skip
-def test_a_stated_limit_is_refused_beyond_what_the_machine_reaches(name, rating, bound) -> None:
+def test_a_stated_limit_is_refused_beyond_what_the_machine_reaches(name, rating, bound):
     assert derive({name: bound * (1.0 - 1e-12)}, RIG, rating)[0][name] == pytest.approx(bound)
     assert derive({name: math.inf}, RIG, rating)[0][name] == math.inf
     with pytest.raises(ParameterError, match=f"parameter {name}_limit = .* expected at most"):
         derive({name: bound * 1.001}, RIG, rating)
 
 
-def test_a_larger_stated_torque_moves_what_follows_from_it() -> None:
+def test_a_larger_stated_torque_moves_what_follows_from_it():
     more = 1.5 * MOTOR
     assert derive({"torque": more}, RIG)[0]["velocity"] == pytest.approx(0.8 * more / B)
     assert derive({"torque": more, "deflection": 2.99 * more / K}, RIG)[0]["torque"] == more
@@ -75,14 +73,14 @@ def test_a_larger_stated_torque_moves_what_follows_from_it() -> None:
 
 
 @pytest.mark.parametrize(("ft", "left"), [(15.0, 15.0), (16.0, 0.01 * K)])
-def test_behind_a_free_end_the_torque_limits_the_spring(ft, left) -> None:
+def test_behind_a_free_end_the_torque_limits_the_spring(ft, left):
     limits, sources = {"deflection": 0.01, "ft": ft}, {"deflection": "stated"}
     felt_through_spring(limits, sources, RIG)
     assert limits == pytest.approx({"deflection": math.inf, "ft": left})
     assert sources["deflection"] == "ft_limit limits it" and ("ft" in sources) == (left != ft)
 
 
-def test_a_free_end_needs_a_limit_of_its_travel() -> None:
+def test_a_free_end_needs_a_limit_of_its_travel():
     free = load_rig("paper_moving_output")
     check_travel(math.inf, RIG)
     check_travel(1.0, free)

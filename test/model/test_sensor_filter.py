@@ -1,12 +1,11 @@
 """Known filters of sensors against slow plain ones: lsim on a fine grid, loops without our formulas."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from runs import RATE, RIG
 from scipy.linalg import solve_discrete_are
 from scipy.signal import lsim
 
@@ -23,8 +22,7 @@ from rsea_ros.model.sensor_filter import KINDS, SensorFilter
 from rsea_ros.model.simulation import Plant, drive_of, simulate, synthesize
 from rsea_ros.records.record import Channel, Record
 
-RIG = rsea.load_rig("paper_high_impedance")
-RATE, FINE = 280.0, 60
+FINE = 60
 COMMAND = Channel(np.arange(400) / RATE, np.append(0.0, 10.0 * np.random.default_rng(0).standard_normal(399)))
 NUMBERS = {
     "one_pole": (0.036,), "two_poles": (12.0, 0.4), "average": (5.0,), "exponential": (0.2,),

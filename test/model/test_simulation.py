@@ -1,7 +1,5 @@
 """The simulation, whole or a sample at a time, against independent computations of the same numbers."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -14,7 +12,7 @@ from scipy.signal import lsim
 
 from rsea_ros.model import outputs
 from rsea_ros.model.prediction_errors import in_phase, predict
-from rsea_ros.model.rig import EffectSetting, Rig
+from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import Plant, build, run, simulate, synthesize
 from rsea_ros.model.transfer import frequency_response
@@ -126,20 +124,15 @@ def test_a_large_swing_of_the_pendulum_is_that_of_scipy():
     from scipy.integrate import solve_ivp
 
     rig = load_rig("pendulum")
-    inertia, damping = (
-        rig["rotor.reflected_inertia"] + rig["spring_end.inertia"],
-        rig["rotor.reflected_damping"],
-    )
-    command = np.full(560, 2.5)
-    ours = simulate(rig, uniform(command, 280.0))
-    exact = solve_ivp(
-        lambda t, x: [x[1], (2.5 - damping * x[1] - rig["spring_end.gravity"] * np.sin(x[0])) / inertia],
-        (0, 2.0),
-        [0.0, 0.0],
-        t_eval=np.arange(1, 561) / 280.0,
-        rtol=1e-11,
-        atol=1e-12,
-    ).y
+    inertia = rig["rotor.reflected_inertia"] + rig["spring_end.inertia"]
+    damping, gravity = rig["rotor.reflected_damping"], rig["spring_end.gravity"]
+    ours = simulate(rig, uniform(np.full(560, 2.5), 280.0))
+
+    def rate(t, x):
+        return [x[1], (2.5 - damping * x[1] - gravity * np.sin(x[0])) / inertia]
+
+    at = np.arange(1, 561) / 280.0
+    exact = solve_ivp(rate, (0, 2.0), [0.0, 0.0], t_eval=at, rtol=1e-11, atol=1e-12).y
     assert exact[0].max() > 1.0
     for channel, values in (("position", exact[0]), ("velocity", exact[1])):
         assert np.abs(ours[channel] - values).max() < 0.1 * rig.sensors[channel].noise
@@ -147,17 +140,13 @@ def test_a_large_swing_of_the_pendulum_is_that_of_scipy():
 
 def test_sensors_round_and_are_noisy_as_the_rig_says():
     rig = load_rig("paper_high_impedance")
-    command = Channel(np.arange(20000) / 280.0, np.zeros(20000))
-    record = synthesize(rig, command, seed=1)
+    record = synthesize(rig, Channel(np.arange(20000) / 280.0, np.zeros(20000)), seed=1)
     for channel, sensor in rig.sensors.items():
-        y = record[channel].y
-        expected = np.hypot(sensor.noise, sensor.quantum / np.sqrt(12))
-        if sensor.quantum:
-            np.testing.assert_allclose(y / sensor.quantum, np.rint(y / sensor.quantum), atol=1e-6)
-            expected = (
-                np.std(np.rint(np.random.default_rng(2).normal(0, sensor.noise, 20000) / sensor.quantum))
-                * sensor.quantum
-            )
+        y, expected = record[channel].y, sensor.noise
+        if step := sensor.quantum:
+            np.testing.assert_allclose(y / step, np.rint(y / step), atol=1e-6)
+            noise = np.random.default_rng(2).normal(0, sensor.noise, 20000)
+            expected = step * np.std(np.rint(noise / step))
         assert np.std(y) == pytest.approx(expected, rel=0.05)
 
 
@@ -193,7 +182,7 @@ def test_reset_begins_again():
     np.testing.assert_array_equal(record_of(plant, command), first)
 
 
-def hum(phase: float) -> Rig:
+def hum(phase):
     parameters = {"amplitude": 0.2, "frequency": 50.02, "phase": phase}
     return load_rig("paper_high_impedance").with_effects(EffectSetting("mains_interference", parameters))
 

@@ -1,7 +1,5 @@
 """The elastic element: Eq. (9) is the slope of Eq. (8), and can be turned round."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

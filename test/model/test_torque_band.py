@@ -1,7 +1,5 @@
 """Whether there is a torque, deaf to noise, and how its power lies about the edge."""
 
-from __future__ import annotations
-
 import functools
 import math
 

@@ -1,7 +1,5 @@
 """Transfer functions, state space and equations of motion agree; they contain the paper's."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -22,6 +20,7 @@ HZ = np.geomspace(0.05, 300.0, 60)
 S = 2j * np.pi * HZ
 K_S, J_SC, B_S = 1530.456, 0.0040, 3.0
 J_EFF, B_EFF = 0.953 + J_SC, 23.088 + B_S
+EQ_1 = formulas.eq_1_lumped_distal_per_motor(K_S, J_EFF, B_EFF)
 
 
 def read_outputs(rig):
@@ -80,18 +79,10 @@ def test_the_high_impedance_response_is_the_papers_but_for_the_rotors_spin():
     rig = load_rig("paper_high_impedance")
     j = inner_inertia(rig)
     eq_5 = formulas.eq_5_proximal_per_motor(K_S, 0.953 / 502**2, 23.088 / 502**2, 502, j, B_S)
-    agree(
-        distal_per_motor(rig, "element")(S),
-        formulas.eq_1_lumped_distal_per_motor(K_S, J_EFF, B_EFF)(S),
-    )
-    agree(
-        proximal_per_motor(rig)(S) * (J_EFF * S**2 + B_EFF * S + K_S),
-        eq_5.numerator @ [S**2, S, S**0],
-    )
-    agree(
-        transfer.distal_per_proximal(rig, "element")(S),
-        formulas.eq_6_distal_per_proximal(K_S, j, B_S)(S),
-    )
+    eq_6 = formulas.eq_6_distal_per_proximal(K_S, j, B_S)
+    agree(distal_per_motor(rig, "element")(S), EQ_1(S))
+    agree(proximal_per_motor(rig)(S) * (J_EFF * S**2 + B_EFF * S + K_S), eq_5.numerator @ [S**2, S, S**0])
+    agree(transfer.distal_per_proximal(rig, "element")(S), eq_6(S))
 
 
 @pytest.mark.parametrize("train", ["planetary", "star"])
@@ -101,9 +92,7 @@ def test_the_paper_is_the_limit_of_a_large_ratio(train):
     errors = []
     for ratio in (50.0, 500.0, 5000.0, 50000.0):
         exact = proximal_per_motor(base.with_values({"gear.ratio": ratio}))(S)
-        eq_5 = formulas.eq_5_proximal_per_motor(
-            K_S, 0.953 / ratio**2, 23.088 / ratio**2, ratio, J_SC, B_S
-        )
+        eq_5 = formulas.eq_5_proximal_per_motor(K_S, 0.953 / ratio**2, 23.088 / ratio**2, ratio, J_SC, B_S)
         errors.append(np.abs(exact - eq_5(S)).max())
     assert errors[-1] < 1e-4
     np.testing.assert_allclose(np.array(errors[:-1]) / errors[1:], 10.0, rtol=0.1)
@@ -125,21 +114,9 @@ def test_both_ends_together_take_the_change_of_angular_momentum(name, train):
 
 def test_lumped_model_is_eqs_1_to_3():
     rig = lumped_rig(load_rig("paper_high_impedance"))
-    for ours, printed in (
-        (
-            distal_per_motor(rig, "element"),
-            formulas.eq_1_lumped_distal_per_motor(K_S, J_EFF, B_EFF),
-        ),
-        (
-            proximal_per_motor(rig),
-            transfer.Fraction([J_EFF, B_S, K_S], [J_EFF, B_EFF, K_S]),
-        ),
-        (
-            transfer.distal_per_proximal(rig, "element"),
-            transfer.Fraction([K_S], [J_EFF, B_S, K_S]),
-        ),
-    ):
-        agree(ours(S), printed(S))
+    agree(distal_per_motor(rig, "element")(S), EQ_1(S))
+    agree(proximal_per_motor(rig)(S), transfer.Fraction([J_EFF, B_S, K_S], [J_EFF, B_EFF, K_S])(S))
+    agree(transfer.distal_per_proximal(rig, "element")(S), transfer.Fraction([K_S], [J_EFF, B_S, K_S])(S))
 
 
 @pytest.mark.parametrize("name", WITH_SPRING)

@@ -1,7 +1,5 @@
 """Figures of the paper: their values, and the drawings of docs/derivation.md."""
 
-from __future__ import annotations
-
 import functools
 from pathlib import Path
 
