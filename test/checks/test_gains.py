@@ -1,7 +1,5 @@
 """Sign, scale and smoothing are reported with their remedy; effects and strangers' rigs raise no alarm."""
 
-from __future__ import annotations
-
 import functools
 import json
 
@@ -115,8 +113,7 @@ def test_an_averaged_sensor_is_named_with_its_length(names, samples, centred):
 
 
 @pytest.mark.parametrize(
-    ("effect", "parameters"),
-    [("ft_sensor_lag", {"time_constant": 5e-3}), ("command_delay", {"delay": 8e-3})],
+    ("effect", "parameters"), [("ft_sensor_lag", {"time_constant": 5e-3}), ("command_delay", {"delay": 8e-3})]
 )
 def test_a_lag_of_sensor_or_drive_is_not_taken_for_a_moving_average(effect, parameters):
     bench = hide(drawn_bench(np.random.default_rng(1)), effect, parameters)

@@ -1,7 +1,5 @@
 """`rsea check`: a table, JSON, statuses, windows; and the same checks before identify and diagnose."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np
