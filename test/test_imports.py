@@ -1,7 +1,5 @@
 """What the syntax tree of every module says: who imports whom, arguments, units, who writes files."""
 
-from __future__ import annotations
-
 import ast
 import re
 import sys
