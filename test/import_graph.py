@@ -1,7 +1,5 @@
 """Who imports whom, read from the syntax tree of every module."""
 
-from __future__ import annotations
-
 import ast
 import gc
 from collections.abc import Callable, Iterable, Iterator

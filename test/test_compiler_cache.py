@@ -1,7 +1,5 @@
 """Compiled code is kept where the user can write, and is recompiled when its sources change."""
 
-from __future__ import annotations
-
 import ast
 import errno
 import os

@@ -1,7 +1,5 @@
 """Docs and generated files agree with the code: catalogue, policies, names; links lead to files."""
 
-from __future__ import annotations
-
 import importlib.util
 import re
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Every kind of fault of the code is in one table, and in the docs."""
 
-from __future__ import annotations
-
 import ast
 from collections.abc import Iterator
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Commands published only when they change are held, as the bench held them; repeated samples are counted."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

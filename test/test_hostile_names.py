@@ -1,7 +1,5 @@
 """What comes from outside stays text in what is generated: programs, models, pages, tables, shell lines."""
 
-from __future__ import annotations
-
 import ast
 import csv
 import io

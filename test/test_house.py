@@ -1,7 +1,5 @@
 """The house: no two modules import each other, and a budget that only falls (docs/decisions/0182)."""
 
-from __future__ import annotations
-
 import ast
 from graphlib import TopologicalSorter
 

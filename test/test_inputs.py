@@ -1,7 +1,5 @@
 """Bad and unusual benches and bags: a result, or one line and status 2. The full gate is `bench inputs`."""
 
-from __future__ import annotations
-
 import json
 import warnings
 

@@ -1,7 +1,5 @@
 """./rsea makes its environment once, from the locks alone, uses no half-made one, says why it cannot."""
 
-from __future__ import annotations
-
 import hashlib
 import importlib.util
 import os

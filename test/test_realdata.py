@@ -1,8 +1,6 @@
 """`rsea import` and `rsea identify` on measurements of real machines, against published values (see
 ../shared/realdata/README.md for their origin)."""
 
-from __future__ import annotations
-
 import functools
 import json
 from pathlib import Path
@@ -20,7 +18,7 @@ from rsea_ros.identification.identify import identify
 from rsea_ros.identification.result import Statics, statics_of
 from rsea_ros.model.prediction_errors import predict
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.records.record import Record
+from rsea_ros.records.record import Channel, Record
 from rsea_ros.report.identification import statics_sentences
 
 CONFIG = Path(__file__).resolve().parents[1] / "config"
@@ -48,6 +46,10 @@ def only(effects: set[str]) -> DiagnosisSettings:
 def import_file(file: str, mapping: str) -> Record:
     """Return a file of measurements as a record."""
     return import_record(REAL / file, load_map(CONFIG / f"imports/{mapping}.yaml"))
+
+
+def every_second(record: Record) -> Record:
+    return record.with_channels(**{n: Channel(c.t[::2], c.y[::2]) for n, c in record.channels.items()})
 
 
 def identify_file(file: str, mapping: str, rig: str, folder: Path, *options: str) -> dict:
@@ -147,9 +149,12 @@ def test_cycloidal_saturation_is_seen_and_fitted():
 
 
 def test_emps_is_diagnosed_with_coulomb_friction_and_its_asymmetry():
-    """Coulomb friction first, then its difference between directions; no Stribeck; tested on another run."""
-    run = import_file("emps/DATA_EMPS.mat", "emps_identification")
-    pulses = import_file("emps/DATA_EMPS_PULSES.mat", "emps_pulses")
+    """Coulomb friction first, then its difference between directions; no Stribeck; tested on another run.
+
+    At 500 of its 1000 Hz: the torque is within 0.01 % and the residual 3.2 % either way.
+    """
+    run = every_second(import_file("emps/DATA_EMPS.mat", "emps_identification"))
+    pulses = every_second(import_file("emps/DATA_EMPS_PULSES.mat", "emps_pulses"))
     outcome = diagnose([run], load_rig("emps"), holdout=pulses, settings=only(FRICTIONS))
     assert [c.name for c in outcome.causes] == ["coulomb_friction", "asymmetric_friction"]
     assert outcome.causes[0].parameters["torque"].value == pytest.approx(20.394, rel=0.03)

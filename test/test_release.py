@@ -47,8 +47,7 @@ def test_a_release_names_its_maintainer_and_place_once_however_often_it_is_made(
 
 
 @pytest.mark.parametrize(
-    "words",
-    [(), WHO[:2], (WHO[0], "me@example.com", WHO[2]), (*WHO, "1.0"), (WHO[0], WHO[1], "lab.org")],
+    "words", [(), WHO[:2], (WHO[0], "me@example.com", WHO[2]), (*WHO, "1.0"), (WHO[0], WHO[1], "lab.org")]
 )
 def test_a_release_without_a_real_maintainer_is_refused_and_nothing_is_written(words, tmp_path, capsys):
     manifest = tmp_path / "package.xml"

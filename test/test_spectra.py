@@ -1,7 +1,5 @@
 """Spectra and fast lengths of transforms beside those of scipy, and a sine of known power."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy import signal

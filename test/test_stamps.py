@@ -1,11 +1,18 @@
-"""Corrected stamps: jitter is no fault, gaps and jumps are found, and a second pass changes nothing."""
+"""Corrected stamps: jitter is no fault; gaps, jumps and mixed rows are; torques go behind their edge."""
 
-from __future__ import annotations
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+import rsea_ros as rsea
+from rsea_ros.checks.carried import with_check_faults
+from rsea_ros.checks.check import check_record
 from rsea_ros.errors import ChannelError
+from rsea_ros.model.prediction_errors import predict
+from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.simulation import synthesize
+from rsea_ros.records.holds import INSIDE, behind_the_edge
 from rsea_ros.records.record import Channel, Record
 from rsea_ros.records.stamp_order import far_apart, jumps_back
 from rsea_ros.records.stamps import repair_stamps
@@ -195,3 +202,140 @@ def test_a_motion_before_the_first_command_is_reported():
     assert (fault.kind, fault.channel, fault.detail) == (
         "partly_recorded", "command", "nothing from 0 s to 2.004 s",
     )  # fmt: skip
+
+
+BENCH = rsea.load_rig("paper_high_impedance")
+SOUND = rsea.simulate(BENCH, 15.0 * np.random.default_rng(1).standard_normal(4200), rate=280.0)
+
+
+def sorted_after(step):
+    """Return the run with a clock that steps back in the middle, its rows sorted by their stamps."""
+    channels = {}
+    for n, c in SOUND.channels.items():
+        t = np.where(c.t > 7.5, c.t - step, c.t)
+        order = np.argsort(t, kind="stable")
+        channels[n] = Channel(t[order], c.y[order])
+    return SOUND.with_channels(**channels)
+
+
+@pytest.mark.parametrize("step", [3.0, 3.0013])
+def test_rows_of_two_times_are_left_out_and_the_rest_is_sound(step):
+    """17 % were read as duplicates, and 7.8 times the noise came with reassuring intervals."""
+    record, faults = repair_stamps(sorted_after(step))
+    assert {f.kind for f in faults} == {"mixed_rows", "dropped_samples"}
+    (mixed,) = [f for f in faults if f.kind == "mixed_rows"]
+    assert mixed.size == pytest.approx(step, abs=0.2) and "stepped back" in mixed.detail
+    sound = rsea.predict(BENCH, SOUND)
+    left = rsea.predict(BENCH, record)
+    for n in ("ft", "position", "velocity"):
+        assert left[n].rms_error == pytest.approx(sound[n].rms_error, rel=0.2)
+
+
+def test_messages_that_came_twice_are_no_mixed_rows():
+    twice = {}
+    for n, c in SOUND.channels.items():
+        k = np.repeat(np.arange(len(c)), np.where(abs(c.t - 7.0) < 2.0, 2, 1))
+        twice[n] = Channel(c.t[k], c.y[k])
+    record = SOUND.with_channels(**twice)
+    assert {f.kind for f in repair_stamps(record)[1]} == {"duplicate_stamps"}
+
+
+def test_a_log_whose_rate_halves_keeps_every_row():
+    """`the clock stepped back by 18.6 s`, and 76 % of a sound record left out: the dense half of it."""
+    sparse = {}
+    for n, c in SOUND.channels.items():
+        k = np.r_[np.arange(0, 2100), np.arange(2100, len(c), 2)]
+        sparse[n] = Channel(c.t[k], c.y[k])
+    record, faults = repair_stamps(SOUND.with_channels(**sparse))
+    assert "mixed_rows" not in {f.kind for f in faults}
+    assert len(record["position"]) == len(sparse["position"])
+
+
+def test_rows_that_are_left_out_can_be_kept_and_are_red():
+    mixed = sorted_after(3.0013)
+    assert len(repair_stamps(replace(mixed, keeps_rows=True))[0]["ft"]) == len(SOUND["ft"])
+    (left_out,) = [f for f in check_record(mixed, BENCH).findings if f.kind == "mixed_rows"]
+    assert left_out.light == "red" and "--keep-rows" in left_out.remedy
+
+
+H, ROWS = 1 / 280, 2800
+RNG = np.random.default_rng(5)
+U = 15.0 * RNG.standard_normal(ROWS)
+T = H * np.arange(ROWS)
+ENDED = np.concatenate([[0.0], U[:-1]])
+
+
+def driven(y, t=T, u=U, **others):
+    made = {"command": Channel(T, u), "motor_torque": Channel(t, y + 0.05 * RNG.standard_normal(len(y)))}
+    return Record({**made, **others})
+
+
+def test_a_torque_of_the_command_that_begins_moves_behind_its_edge():
+    repaired, (fault,) = repair_stamps(driven(0.9 * U + 0.3))
+    assert (fault.kind, fault.channel, fault.share) == ("early_torque", "motor_torque", 1.0)
+    assert np.allclose(repaired["motor_torque"].t, T + INSIDE * H)
+    assert repair_stamps(repaired)[1] == [], "a second pass changes nothing"
+
+
+@pytest.mark.parametrize(
+    "record",
+    [
+        driven(ENDED),  # the convention
+        driven(np.concatenate([[0.0], 0.4 * U[:-1] + 0.6 * ENDED[:-1]])),  # late: a slow current loop
+        driven(U, t=T + 0.4 * H),  # between two commands: no doubt
+        driven(U[:40], t=T[:40]),  # too few
+        driven(RNG.standard_normal(ROWS)),  # of neither
+        driven(np.full(ROWS, 3.0), u=np.full(ROWS, 3.0)),  # a command that never changes
+        driven(U, reference=Channel(T, U)),  # its commands are those of a simulated loop
+    ],
+)
+def test_any_other_torque_stays(record):
+    repaired, faults = behind_the_edge(record)
+    assert faults == []
+    assert repaired is record
+
+
+@pytest.mark.parametrize("size", [1e-300, 1e300])
+def test_no_square_of_a_huge_or_tiny_torque_overflows(size):
+    assert not behind_the_edge(driven(size * ENDED, u=size * U))[1]
+
+
+def test_a_slow_command_decides_it_where_the_noise_lets_it():
+    slow = 20.0 * np.sin(2 * np.pi * 1.0 * T)
+    assert behind_the_edge(driven(slow, u=slow))[1]
+    noisy = driven(slow + RNG.standard_normal(ROWS), u=slow)
+    assert not behind_the_edge(noisy)[1]
+
+
+@pytest.mark.parametrize(("step", "expected"), [(10, INSIDE * H), (0.1, H / 10)])
+def test_a_faster_torque_moves_by_no_more_than_its_period(step, expected):
+    t = np.arange(0.0, ROWS, step) * H
+    held = U[np.minimum(np.floor(t / H + 1e-6).astype(int), ROWS - 1)]
+    repaired, faults = behind_the_edge(driven(held, t=t))
+    assert len(faults) == 1
+    assert repaired["motor_torque"].t[0] == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(("rate", "late"), [(100.0, 0.0), (280.0, 0.1), (280.0, 0.5), (2000.0, 0.9)])
+def test_a_torque_that_is_read_after_its_command_fits_however_late(rate, late):
+    rig = load_rig("paper_high_impedance")
+    t = np.arange(1000) / rate
+    made = synthesize(rig, Channel(t, U[:1000]), seed=1)
+    read_after = made.with_channels(motor_torque=driven(U[:1000], t=t + late / rate)["motor_torque"])
+    repaired, _ = repair_stamps(read_after)
+    assert predict(rig, repaired)["motor_torque"].rms_error < 0.1
+
+
+def test_a_sound_bench_that_reads_after_its_commands_is_told():
+    rig = load_rig("paper_high_impedance")
+    made = synthesize(rig, Channel(T, U), seed=1)
+    read_after = made.with_channels(motor_torque=driven(U)["motor_torque"])
+    assert predict(rig, read_after)["motor_torque"].rms_error > 10.0
+    checked = check_record(read_after, rig)
+    (told,) = checked.of("early_torque")
+    assert (told.light, told.channel) == ("green", "motor_torque")
+    assert [f.kind for f in checked.faults] == ["early_torque"]
+    assert not check_record(made, rig).of("early_torque")
+    assert np.allclose(with_check_faults(read_after, rig, masks=False)["motor_torque"].t, T + INSIDE * H)
+    masked = with_check_faults(read_after, rig, masks=True)
+    assert np.allclose(masked["motor_torque"].t, T), "its next stage does"

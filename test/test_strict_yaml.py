@@ -1,7 +1,5 @@
 """YAML that people write: ambiguous text is refused with its line, and nothing expands while it is read."""
 
-from __future__ import annotations
-
 import os
 import time
 

@@ -1,7 +1,5 @@
 """Units: every common spelling of a unit is accepted for it and for no other."""
 
-from __future__ import annotations
-
 import itertools
 from dataclasses import replace
 

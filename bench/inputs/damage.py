@@ -111,7 +111,7 @@ def _records_of(data: bytes) -> Parts:
 def damaged_mcap(rng: random.Random, data: bytes, other: bytes = b"") -> bytes:
     """Return an MCAP file damaged in its bytes or among its records.
 
-    test/msg_adapters/test_mutations.py damages messages in chunks whose checksum fits.
+    test/msg_adapters/test_damaged.py damages messages in chunks whose checksum fits.
     """
     records = _records_of(data[len(MAGIC) : -len(MAGIC)]) if data.startswith(MAGIC) else []
     if not records or rng.random() < 0.25:

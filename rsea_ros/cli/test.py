@@ -23,7 +23,7 @@ GROUPS = {
         "test/trends",
     ),
     "safety": (
-        "test/hardware", "test/nodes", "test/cli/test_run_launch_topics.py", "test/test_torque_edge.py",
+        "test/hardware", "test/nodes", "test/cli/test_run_launch_topics.py", "test/test_stamps.py",
         "test/test_held_commands.py", "test/cli/test_ctrl_c.py",
     ),
     "contract": ("test/golden", "test/cli", "test/library", "test/msg_adapters", "test/test_imports.py"),

@@ -1,7 +1,5 @@
 """Dead and frozen channels are named, each of them; rest, standstill and plateaus are neither."""
 
-from __future__ import annotations
-
 import functools
 from dataclasses import replace
 
@@ -142,11 +140,7 @@ def frozen_channels(record):
 
 @pytest.mark.parametrize(
     ("names", "span"),
-    [
-        (("position", "velocity", "ft"), (10.5,)),
-        (("position", "ft"), (4.0, 6.0)),
-        (("ft",), (1.0,)),
-    ],
+    [(("position", "velocity", "ft"), (10.5,)), (("position", "ft"), (4.0, 6.0)), (("ft",), (1.0,))],
 )
 def test_every_channel_of_a_driver_that_stops_is_named(names, span):
     assert frozen_channels(freeze(run(), names, *span)) == set(names)

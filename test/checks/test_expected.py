@@ -1,7 +1,5 @@
 """The response of a channel to its prediction is scipy's, in bands; what is unrelated is known by chance."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

@@ -1,11 +1,15 @@
 """What repeats while the machine moved is frozen; what repeats at rest, or by a quantum, is sound."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
-from rsea_ros.checks.frozen import held_in_motion, longest, simultaneous_holds, while_others_moved
+from rsea_ros.checks.frozen import (
+    frozen_samples,
+    held_in_motion,
+    longest,
+    simultaneous_holds,
+    while_others_moved,
+)
 from rsea_ros.records.record import Channel, Record
 
 RATE = 200.0
@@ -86,3 +90,28 @@ def test_a_run_of_half_a_second_is_told(first, end, told) -> None:
     marked[first:end] = marked[10:20] = True
     assert longest(Channel(T, np.full(len(T), 3.0)), marked) == told
     assert longest(Channel(T, T), np.zeros(len(T), bool)) == ""
+
+
+def held(*runs: tuple[int, int]) -> Channel:
+    """Return 1000 samples with steps from 50.95 to 1, ten of them below 1.5, and repeats in runs."""
+    y = np.cumsum(np.linspace(50.95, 1.0, 1000) * (-1.0) ** np.arange(1000))
+    for first, repeats in runs:
+        y[first : first + repeats + 1] = y[first]
+    return Channel(np.arange(1000) / 100.0, y)
+
+
+def evenly(count: int, repeats: int) -> list[tuple[int, int]]:
+    return [(100 * k, repeats) for k in range(count)]
+
+
+@pytest.mark.parametrize(
+    ("runs", "marked"),
+    [([(100, 28)], 0), ([(100, 30)], 30), (evenly(7, 44), 308), (evenly(7, 46), 0),
+     ([*evenly(7, 46), (800, 48)], 0), ([*evenly(7, 46), (800, 50)], 50)],
+)  # fmt: skip
+def test_more_repeats_than_chance_makes_are_frozen(runs, marked) -> None:
+    """Of ten smallest steps chance makes five repeats: n - 7.5 - 3 sqrt(n) from 5 on are too many, up to 250,
+    when the log is faster than the sensor; half a second is too long in any case."""
+    made = held(*runs)
+    assert np.count_nonzero(frozen_samples(made, "ft")) == marked
+    assert not frozen_samples(made, "command").any() and not frozen_samples(made, "reference").any()

@@ -1,7 +1,5 @@
 """Findings on stamps: rates at the limits of what the rig needs, and the light of each fault."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

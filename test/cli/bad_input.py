@@ -1,7 +1,5 @@
 """Shared by the tests of bad input: run a verb as a person does, or work in a fork; damage a record."""
 
-from __future__ import annotations
-
 import io
 import os
 import subprocess
@@ -34,6 +32,26 @@ def forked(work: Callable[[], object]) -> int:
         finally:
             os._exit(status)
     return os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
+
+
+class Calls:
+    """The system's calls for rsea_ros.outputs.files; before the n-th of some of them something happens."""
+
+    def __init__(self, names, n, happens):
+        self.names, self.left, self._happens = names, n, happens
+
+    def __getattr__(self, name):
+        call = getattr(os, name)
+        if name not in self.names:
+            return call
+
+        def count(*arguments, **options):
+            self.left -= 1
+            if self.left == 0:
+                self._happens(name)
+            return call(*arguments, **options)
+
+        return count
 
 
 def change(record: Record, name: str, k: int, *, y: float | None = None, t: float | None = None) -> Record:

@@ -1,7 +1,5 @@
 """A verb interrupted during its work."""
 
-from __future__ import annotations
-
 import signal
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """`rsea diagnose`: its options, its status, and one line for a run that cannot be diagnosed."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

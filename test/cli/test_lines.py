@@ -1,7 +1,5 @@
 """What verbs print fits a terminal of 80 columns and a log of 100; long work says what it does."""
 
-from __future__ import annotations
-
 import os
 import sys
 from io import StringIO

@@ -1,7 +1,5 @@
 """The command line: verbs are found without being imported, every expected error is one line and a status."""
 
-from __future__ import annotations
-
 import argparse
 import errno
 import importlib
@@ -70,10 +68,7 @@ def test_an_expected_error_is_one_line_and_a_status(verb, capsys, error, status,
     assert capsys.readouterr() == ("", line + "\n")
 
 
-@pytest.mark.parametrize(
-    "error",
-    [ZeroDivisionError, MemoryError, KeyError, LinAlgError],
-)
+@pytest.mark.parametrize("error", [ZeroDivisionError, MemoryError, KeyError, LinAlgError])
 def test_an_error_that_nobody_expected_is_one_line_too(verb, capsys, monkeypatch, error):
     assert verb(raise_error(error("7 pears"))) == 2
     printed, line = capsys.readouterr()

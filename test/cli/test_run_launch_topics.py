@@ -1,7 +1,5 @@
 """Nodes without a `ros2` command: run, launch, topics and call."""
 
-from __future__ import annotations
-
 import re
 import signal
 import subprocess
@@ -97,9 +95,7 @@ def test_a_launched_graph_hears_the_documented_controller_and_one_signal_ends_it
     page = (ROOT / "docs" / "controllers.md").read_text(encoding="utf-8")
     code = re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)[0]
     (tmp_path / "my_controller.py").write_text(code)
-    graph = subprocess.Popen(
-        rsea("launch", "simulation", "model:=false", "identify:=false"), cwd=ROOT
-    )
+    graph = subprocess.Popen(rsea("launch", "simulation", "model:=false", "identify:=false"), cwd=ROOT)
     controller = subprocess.Popen(
         rsea("run", "my_controller.py"), cwd=tmp_path, stderr=subprocess.PIPE, text=True
     )

@@ -1,7 +1,5 @@
 """Verbs that write, with their results at hand: nothing is computed, only written."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """What is played, by the name of what it writes; a later step reads what an earlier one wrote."""
 
-from __future__ import annotations
-
 import argparse
 import importlib
 import re
@@ -38,18 +36,18 @@ PLAY = ("backlash", "hard_stop", "ft_sensor_lag", "coulomb_friction")
 NO_DRAG, NO_PLAY = (" ".join(n for n in catalogue() if n not in tried) for tried in (DRAGS, PLAY))
 
 VERBS: dict[str, tuple[str, ...]] = {
-    "bag": (f"simulate {RIG} --effect coulomb_friction:torque=3 --duration 10 --seed 5 --out bag",),
+    "bag": (f"simulate {RIG} --effect coulomb_friction:torque=3 --duration 8 --seed 5 --out bag",),
     "check": ("check bag", "check bag --json"),
     "identified": ("identify bag --out identified",),
     "diagnosed": ("diagnose bag --out diagnosed",),
     "diagnosis_without_friction": (
-        f"diagnose bag --without {NO_DRAG} --max-causes 1 --json --from 1 --to 9",
+        f"diagnose bag --without {NO_DRAG} --max-causes 1 --json --from 1 --to 7",
     ),
     "predicted.csv": ("predict diagnosed/model.yaml bag --out predicted.csv",),
-    "law": ("law bag --out law --from 4",),
+    "law": ("law bag --out law --from 3",),
     "run": ("experiment play.yaml drag.yaml --limits torque=40,deflection=0.1 --longest 4 --out run",),
     "designed": ("design --out designed",),
-    "controlled": (f"control {RIG} --rate 140 --out controlled",),
+    "controlled": (f"control {RIG} --rate 100 --out controlled",),
     "paper": ("paper --duration 20 --out paper",),
     "exported": tuple(
         f"export --{kind} diagnosed/model.yaml --out exported{name}"
@@ -80,14 +78,14 @@ VERBS: dict[str, tuple[str, ...]] = {
         "diagnose bag --holdout bag", "diagnose bag --without dance", "diagnose bag --from 5 --to 3",
         "diagnose bag --max-causes none", "diagnose bag --fail-on dance", "identify bag --topic ft=/nowhere",
         "identify bag --axis torqe.z", "identify bag --shift ft=much", "check bag --joint elbow",
-        "check bag --window 3", "predict map.yaml bag", "predict bag", "law bag --from 9.9",
+        "check bag --window 3", "predict map.yaml bag", "predict bag", "law bag --from 7.9",
         f"simulate {RIG} --effect dance:torque=1 --out x", f"simulate {RIG} --effect backlash:gap=-1 --out x",
         f"simulate {RIG} --effect backlash:gap=wide --out x", f"simulate {RIG} --duration 0 --out x",
         f"simulate {RIG} --rate 1e9 --out x", f"simulate {RIG} --low 200 --out x",
         f"simulate {RIG} --out bag",
         f"experiment {RIG} --limits torque=40", f"experiment {RIG} --limits torque=-1 --bag bag",
         f"experiment {RIG} --limits torqe=40", "design --torque -5", "design --unit rd85",
-        "control bare_drive", "control pd_joint",
+        "control bare_drive", "control pd_joint --rate 280",
         f"control {RIG} --rate 3", f"control {RIG} --rate 10000", f"control --free {RIG}",
         "export --mjcf pd_joint", "export --fmu nowhere",
         "effects backlsh", "rig check map.yaml", "rig new a/b", "import map.yaml --map map.yaml --out x",

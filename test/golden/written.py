@@ -4,8 +4,6 @@ Left out of the text: dates, hashes, versions and the temporary folder. Numbers 
 four digits, long lists of numbers and drawings are summed up.
 """
 
-from __future__ import annotations
-
 import base64
 import gzip
 import json
@@ -296,5 +294,3 @@ def _room(word: str, part: float) -> float:
         return 0.0 if len(digits.strip("-+")) < 4 else 1.0
     unit = 10.0 ** (int(exponent or 0) - len(digits.partition(".")[2]))
     return max(1.01 * unit, part * abs(_value(word)))
-
-

@@ -1,7 +1,5 @@
 """The door: `import rsea_ros as rsea` from arrays to a diagnosis, without ROS and without side effects."""
 
-from __future__ import annotations
-
 import functools
 import json
 import os
@@ -218,11 +216,11 @@ WRONG = (None, "text", [1], float("nan"), -1.0, {}, {"torque": "much"}, object()
 
 
 @pytest.mark.parametrize("door", DOORS)
-@pytest.mark.parametrize("wrong", WRONG, ids=lambda v: type(v).__name__)
-def test_whatever_a_door_is_given_it_says_so_in_its_own_words(door, wrong, tmp_path, monkeypatch):
+def test_whatever_a_door_is_given_it_says_so_in_its_own_words(door, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(rsea.RseaError, match=r"expected|no such bag"):
-        DOORS[door](wrong)
+    for wrong in WRONG:
+        with pytest.raises(rsea.RseaError, match=r"expected|no such bag"):
+            DOORS[door](wrong)
 
 
 @pytest.mark.parametrize(

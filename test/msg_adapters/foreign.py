@@ -1,7 +1,5 @@
 """Messages and bags made by rosbags, which shares no code with ours."""
 
-from __future__ import annotations
-
 import sqlite3
 from collections.abc import Sequence
 from contextlib import closing

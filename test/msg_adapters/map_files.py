@@ -1,7 +1,5 @@
 """A small table and its import map."""
 
-from __future__ import annotations
-
 CSV = "t,phi,i,load\n0.0,90,1500,2\n0.5,-45,-500,4\n1.0,0,0,6\n"
 MAP = """
 time: {column: t, unit: s}

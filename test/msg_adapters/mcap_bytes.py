@@ -1,7 +1,5 @@
 """MCAP files put together record by record, by the specification, so that any part can be wrong."""
 
-from __future__ import annotations
-
 import struct
 import sys
 import zlib

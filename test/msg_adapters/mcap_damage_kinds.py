@@ -1,7 +1,5 @@
 """Damage of MCAP files, kind by kind, done to any run."""
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass

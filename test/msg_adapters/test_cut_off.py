@@ -1,10 +1,9 @@
-"""Recordings that broke off: what is complete comes back, with a note, and never a traceback."""
-
-from __future__ import annotations
+"""Recordings that broke off, by a kill or a power cut: what is complete comes back, with a note."""
 
 import os
 import random
 import signal
+from threading import Event
 
 import numpy as np
 import pytest
@@ -13,9 +12,10 @@ from foreign import JOINT_STATE, WRENCH, run_rows, write_foreign
 from mcap_bytes import CHUNK_ROWS, McapFile, write
 from rosbags.rosbag2 import StoragePlugin
 
-from msg_adapters import BagWriter, read_record
+from msg_adapters import BagWriter, iterate, read_record
 from msg_adapters.bags import read_contents
 from msg_adapters.cdr import joint_states, wrenches
+from msg_adapters.mcap_storage import McapStorage
 from rsea_ros.errors import BagError
 
 
@@ -90,3 +90,79 @@ def test_a_database_that_breaks_off_gives_what_it_can(tmp_path):
             assert "\n" not in str(error)
             outcomes.add("refused")
     assert outcomes == {"read", "refused"}
+
+
+BOOL = bytes([0, 1, 0, 0, 1])
+
+
+class PowerCut:
+    """The clock of a recording, and the part of its file that is on the disk."""
+
+    def __init__(self, monkeypatch, storage):
+        self.now, self.safe = 0.0, 0
+        monkeypatch.setattr("msg_adapters.writing.time.monotonic", lambda: self.now)
+        self._sync = storage.sync
+
+    def sync(self, storage):
+        """Note how long the file was when it was last synchronised."""
+        self.safe = storage.path.stat().st_size
+        self._sync(storage)
+
+
+@pytest.mark.parametrize("interval", [0.5, 2.0])
+def test_a_power_cut_loses_one_interval_at_most(tmp_path, monkeypatch, interval):
+    cut = PowerCut(monkeypatch, McapStorage)
+    monkeypatch.setattr(McapStorage, "sync", lambda storage: cut.sync(storage))
+    with pytest.raises(RuntimeError), BagWriter(tmp_path / "bag", interval=interval) as bag:
+        for k in range(1, 1000):
+            bag.write("/a", "std_msgs/msg/Bool", k, BOOL)
+            cut.now = 0.01 * k
+            bag._syncing.result()
+        raise RuntimeError
+    (file,) = bag.partial.iterdir()
+    file.write_bytes(file.read_bytes()[: cut.safe])
+    kept = [at for _, _, at, _ in iterate(bag.partial)]
+    assert kept == list(range(1, len(kept) + 1))
+    assert 0.01 * (999 - len(kept)) <= interval + 0.02
+
+
+def test_a_disk_that_fails_under_a_recording_is_reported_and_the_rest_is_kept(tmp_path, monkeypatch):
+    cut = PowerCut(monkeypatch, McapStorage)
+
+    def break_power(storage):
+        raise OSError(5, "Input/output error")
+
+    monkeypatch.setattr(McapStorage, "sync", break_power)
+    line = r"bag: cannot be written: Input/output error; .* is in .*bag.partial"
+    with pytest.raises(BagError, match=line), BagWriter(tmp_path / "bag") as bag:
+        for k in range(1, 9):
+            cut.now = 1.1 * k
+            bag.write("/a", "std_msgs/msg/Bool", k, BOOL)
+    assert len(list(iterate(bag.partial))) >= 1
+
+
+def test_a_disk_that_fails_at_the_last_moment_is_reported_too(tmp_path, monkeypatch):
+    cut, answer = PowerCut(monkeypatch, McapStorage), Event()
+
+    def break_power(storage):
+        answer.wait()
+        raise OSError(5, "Input/output error")
+
+    monkeypatch.setattr(McapStorage, "sync", break_power)
+    line = "cannot be written: Input/output error"
+    with pytest.raises(BagError, match=line), BagWriter(tmp_path / "bag") as bag:
+        for k in (1, 2):
+            cut.now = 1.1 * k
+            bag.write("/a", "std_msgs/msg/Bool", k, BOOL)
+        answer.set()
+    assert len(list(iterate(bag.partial))) == 2
+
+
+def test_a_recording_without_new_messages_is_flushed(tmp_path, monkeypatch):
+    cut = PowerCut(monkeypatch, McapStorage)
+    with pytest.raises(RuntimeError), BagWriter(tmp_path / "bag") as bag:
+        bag.write("/a", "std_msgs/msg/Bool", 5, BOOL)
+        cut.now = 1.1
+        bag.keep_up()
+        assert len(list(iterate(bag.partial))) == 1
+        raise RuntimeError

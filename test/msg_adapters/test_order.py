@@ -1,7 +1,5 @@
 """Messages out of order in the log are sorted by their stamps, unless a clock has jumped."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from foreign import EPOCH, run_rows, wrench, write_foreign

@@ -1,12 +1,23 @@
-"""Bags of all kinds, written by rosbags, come out as the same record."""
-
-from __future__ import annotations
+"""Bags of all kinds, of ROS 1 and of other types too, written by rosbags, come out as the same record."""
 
 import numpy as np
 import pytest
-from foreign import EPOCH, joint_state, make, run_rows, wrench, write_foreign
+from foreign import (
+    EPOCH,
+    STORE,
+    Packing,
+    header,
+    joint_state,
+    make,
+    numbers,
+    run_rows,
+    wrench,
+    write_foreign,
+    write_ros1,
+)
 from mcap_bytes import McapFile, write
 from rosbags.rosbag2 import CompressionMode, StoragePlugin
+from rosbags.typesys import get_types_from_msg
 
 from msg_adapters import TopicMap, iterate, read_record
 from rsea_ros.errors import BagError
@@ -142,3 +153,139 @@ def test_all_messages_come_by_log_time_untouched(tmp_path, storage):
     expected = sorted((at, name, message.__msgtype__) for name, at, message in rows)
     assert [(at, name, kind) for name, kind, at, _ in got] == expected
     assert next(raw for name, _, _, raw in got if name == "/else").endswith(b"hello\0")
+
+
+STORE.register(
+    get_types_from_msg("string[] interface_names\nfloat64[] values", "control_msgs/msg/InterfaceValue")
+)
+STORE.register(
+    get_types_from_msg(
+        "std_msgs/Header header\nstring[] joint_names\ncontrol_msgs/InterfaceValue[] interface_values",
+        "control_msgs/msg/DynamicJointState",
+    )
+)
+COMMANDS = "/effort_controller/commands"
+
+
+def read(folder, command, states=None, command_topic=COMMANDS, joint=None):
+    """Return the record of a run whose commands, and states, are other messages. command, states: of k."""
+    rows = []
+    for topic, at, message in run_rows(COUNT):
+        k = round((at - EPOCH) / 3_571_428)
+        if topic.endswith("torque_command"):
+            rows.append((COMMANDS, at, command(k)))
+        elif topic.endswith("joint_states") and states is not None:
+            rows.append((topic, at, states(k, at)))
+        else:
+            rows.append((topic, at, message))
+    topics = TopicMap(joint=joint).with_topics([f"torque_command={command_topic}"])
+    return read_record(write_foreign(folder / "bag", rows), topics=topics)
+
+
+def dynamic(k, at):
+    """The joint beside another one, which has other interfaces."""
+    names = [["position", "temperature"], ["torque_sensor", "velocity", "effort", "position"]]
+    values = [[9.0, 40.0], [8.0, k * 0.2, k * 0.3, k * 0.1]]
+    parts = [
+        make("control_msgs/msg/InterfaceValue", interface_names=n, values=np.array(v))
+        for n, v in zip(names, values, strict=True)
+    ]
+    return make(
+        "control_msgs/msg/DynamicJointState",
+        header=header(at), joint_names=["other", "elbow"], interface_values=parts,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("command", "topic", "note"),
+    [
+        (lambda k: make("std_msgs/msg/Float64", data=k * 0.5), COMMANDS, "have no stamps"),
+        (lambda k: numbers(k * 0.5), COMMANDS, "have no stamps"),
+        (lambda k: numbers(0.0, 0.0, k * 0.5), COMMANDS, "[2] taken, the only one of 3"),
+        (lambda k: numbers(k, k * 0.5), f"{COMMANDS}[1]", "have no stamps"),
+    ],
+)
+def test_commands_of_a_forward_controller_are_read_by_their_log_times(command, topic, note, tmp_path):
+    record = read(tmp_path, command, command_topic=topic)
+    assert record["command"].y.tolist() == [k * 0.5 for k in range(COUNT)]
+    assert np.allclose(record["command"].t, np.arange(COUNT) * 3_571_428e-9, atol=1e-9)
+    assert any(note in line for line in record.notes)
+    assert not record.faults
+
+
+@pytest.mark.parametrize(
+    ("topic", "message"),
+    [
+        (COMMANDS, r"2 numbers without names, expected which: --topic torque_command=/ef.*\[0\] to \[1\]"),
+        (f"{COMMANDS}[2]", "2 numbers without names, expected more than 2"),
+    ],
+)
+def test_several_numbers_need_one_that_is_named(topic, message, tmp_path):
+    with pytest.raises(BagError, match=message):
+        read(tmp_path, lambda k: numbers(k, k * 0.5), command_topic=topic)
+
+
+def test_a_dynamic_joint_state_is_read_by_its_interfaces(tmp_path):
+    record = read(tmp_path, lambda k: numbers(k * 0.5), dynamic, joint="elbow")
+    for name, factor in {"position": 0.1, "velocity": 0.2, "motor_torque": 0.3}.items():
+        assert np.array_equal(record[name].y, np.arange(COUNT) * factor), name
+
+
+@pytest.mark.parametrize(
+    ("joint", "message"), [(None, "2 joints .other, elbow., expected one"), ("knee", "no joint 'knee'")]
+)
+def test_one_joint_of_a_dynamic_joint_state_is_named(joint, message, tmp_path):
+    with pytest.raises(BagError, match=message):
+        read(tmp_path, lambda k: numbers(k * 0.5), dynamic, joint=joint)
+
+
+PACKED = [None, *Packing]
+
+
+@pytest.mark.parametrize("compression", PACKED)
+def test_a_bag_of_ros_1_is_the_same_record(compression, tmp_path):
+    rows = run_rows()
+    old = read_record(write_ros1(tmp_path / "run.bag", rows, compression))
+    new = read_record(write_foreign(tmp_path / "bag", rows))
+    assert old.epoch_ns == new.epoch_ns
+    for name, channel in new.channels.items():
+        assert np.array_equal(old[name].t, channel.t), name
+        assert np.array_equal(old[name].y, channel.y), name
+    assert not old.faults
+
+
+def test_a_damaged_chunk_ends_the_bag_and_is_counted(tmp_path):
+    file = write_ros1(tmp_path / "run.bag", run_rows(500), Packing.BZ2)
+    data = bytearray(file.read_bytes())
+    second = data.index(b"BZh", data.index(b"BZh") + 3)
+    data[second + 20 : second + 60] = bytes(40)
+    file.write_bytes(data)
+    record = read_record(file)
+    fault = next(f for f in record.faults if f.kind == "cut_off")
+    assert 0 < fault.share < 1
+    assert fault.size == 1500 - sum(len(record[name]) for name in ("command", "position", "ft"))
+
+
+def test_a_damaged_byte_anywhere_is_refused_or_read(tmp_path):
+    whole = write_ros1(tmp_path / "run.bag", run_rows(5)).read_bytes()
+    file = tmp_path / "damaged.bag"
+    for at in range(0, len(whole), 101):
+        file.write_bytes(whole[:at] + bytes([whole[at] ^ 0xFF]) + whole[at + 1 :])
+        try:
+            read_record(file)
+        except BagError as error:
+            assert "\n" not in str(error)
+
+
+def test_a_bag_that_was_never_closed_names_the_remedy(tmp_path):
+    file = write_ros1(tmp_path / "run.bag", run_rows(5))
+    data = file.read_bytes()
+    at = data.index(b"index_pos=") + len(b"index_pos=")
+    file.write_bytes(data[:at] + bytes(8) + data[at + 8 :])
+    with pytest.raises(BagError, match=r"not indexed, .*; rosbag reindex mends"):
+        read_record(file)
+
+
+def test_other_topics_are_passed_by(tmp_path):
+    rows = [*run_rows(5), ("/chatter", run_rows(5)[-1][1], make("std_msgs/msg/String", data="hello"))]
+    assert len(list(iterate(write_ros1(tmp_path / "run.bag", rows)))) == 16

@@ -1,7 +1,5 @@
 """Faults of a run, read from the /diagnostics in its bag."""
 
-from __future__ import annotations
-
 import pytest
 from foreign import EPOCH, header, make, raw_of, run_rows, write_foreign
 from mcap_bytes import McapFile, write

@@ -1,7 +1,5 @@
 """Bags that we write: other programs read them, and no partial bag gets the final name."""
 
-from __future__ import annotations
-
 import resource
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """What a designed run says: sentences, figures, tables and experiment.json, of numbers that are given."""
 
-from __future__ import annotations
-
 import json
 import math
 import re

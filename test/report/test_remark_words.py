@@ -1,7 +1,5 @@
 """Remarks of a fit and faults of the data in words."""
 
-from __future__ import annotations
-
 from typing import get_args
 
 import pytest

@@ -1,7 +1,5 @@
 """Numbers, names and doubts as people read them, at the limits where their form changes."""
 
-from __future__ import annotations
-
 import math
 
 import pytest
@@ -56,6 +54,7 @@ from rsea_ros.report import words
         (words.with_interval, (4.00449, 4.0015, 4.0073), ("4.0045", "0.0029")),
         (words.with_interval, (1530.4, 1200.0, 1860.8), ("1530", "330")),
         (words.with_interval, (2.0, 2.0, 2.0), ("2.000", "")),
+        (words.with_interval, (-2.0, -2.5, -1.5), ("−2.00", "0.50")),
         (words.with_interval, (2.0, 1.0, math.inf), ("2.000", "")),
         (words.with_interval, (1.0, 1.0 - 5e-10, 1.0 + 5e-10), ("1.00000", "5.0e−10")),
         (words.with_doubt, (4.0, 3.98, 4.0298), ("4.000", " ± 0.025")),
@@ -63,6 +62,9 @@ from rsea_ros.report import words
         (words.with_doubt, (4.0, 3.89, 5.4), ("4.00", " −0.11/+1.4")),
         (words.with_doubt, (4.0, 4.0, 4.2), ("4.00", " −0/+0.20")),
         (words.measured, (4.00449e-3, 4.0015e-3, 4.0073e-3, "rad"), ("4.0045", " ± 0.0029", "mrad")),
+        (words.measured, (0.95, 0.94, 0.96, "1"), ("0.950", " ± 0.010", "")),
+        (words.measured, (3.0, 2.9, 4.4, "N m"), ("3.00", " −0.10/+1.4", "N·m")),
+        (words.measured, (2.5e-4, 2.3e-4, 2.7e-4, "s"), ("250", " ± 20", "µs")),
         (words.measured_text, (4.00449e-3, 4.0015e-3, 4.0073e-3, "rad"), "4.0045 ± 0.0029 mrad"),
         (words.train, ("harmonic_flexspline_held",), "harmonic, flexspline held"),
         (words.train, ("star",), "star"),

@@ -1,7 +1,5 @@
 """A function that imports a table by a map, and readers in forks, for the tests of tables."""
 
-from __future__ import annotations
-
 import json
 import os
 import resource

@@ -1,7 +1,5 @@
 """Expressions in a map: values worked out by hand, and text that must never be evaluated."""
 
-from __future__ import annotations
-
 import time
 
 import numpy as np

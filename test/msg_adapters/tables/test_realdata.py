@@ -1,7 +1,5 @@
 """The shipped maps on the measurements that they are made for."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

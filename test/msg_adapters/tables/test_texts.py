@@ -1,7 +1,5 @@
 """Texts as other programs write them: preambles, units below the names, decimal commas, D exponents."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """overlay.mcap as other tools read it, and the layouts that show it."""
 
-from __future__ import annotations
-
 import functools
 import json
 import re

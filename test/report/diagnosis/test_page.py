@@ -1,7 +1,5 @@
 """Pages and files of a diagnosis for every verdict."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Figures show the values, and hold no number that JSON cannot hold; packed traces come back."""
 
-from __future__ import annotations
-
 import base64
 import gzip
 
@@ -10,14 +8,7 @@ import pytest
 
 from rsea_ros.diagnosis.residual_analysis import by_frequency
 from rsea_ros.report.figures.figure import AFTER, BEFORE, Curve, line
-from rsea_ros.report.figures.overlay import (
-    MOST_SAMPLES,
-    extremes,
-    overlay_figure,
-    pack,
-    pauses_of,
-    without,
-)
+from rsea_ros.report.figures.overlay import MOST_SAMPLES, extremes, overlay_figure, pack, pauses_of, without
 from rsea_ros.report.figures.spectrum import density, residual_figure
 
 

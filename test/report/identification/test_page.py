@@ -1,7 +1,5 @@
 """The report of an identification as files and in a browser, and its table of parameters."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path
@@ -10,7 +8,6 @@ import numpy as np
 import pytest
 
 from rsea_ros.identification.result import Identification, ParameterEstimate
-from rsea_ros.report import words
 from rsea_ros.report.identification import (
     identification_json,
     identification_report,
@@ -91,20 +88,3 @@ def test_a_write_that_fails_leaves_nothing(identification: Identification, tmp_p
     with pytest.raises(OSError, match=r"report\.html"):
         write_results(identification, tmp_path)
     assert [p.name for p in tmp_path.iterdir()] == ["report.html"]
-
-
-@pytest.mark.parametrize(
-    ("value", "low", "high", "text"),
-    [(0.95312, 0.95301, 0.95323, ("0.95312", "0.00011")), (1530.4, 1500.4, 1560.4, ("1530", "30")),
-     (-2.0, -2.5, -1.5, ("−2.00", "0.50")), (1.0, 1.0, 1.0, ("1.000", ""))],
-)  # fmt: skip
-def test_values_are_rounded_to_their_interval(
-    value: float, low: float, high: float, text: tuple[str, str]
-) -> None:
-    assert words.with_interval(value, low, high) == text
-
-
-def test_small_quantities_get_a_prefix() -> None:
-    assert words.quantity(6.17e-6, "rad") == "6.17 µrad"
-    assert words.quantity(0.03, "N m") == "0.0300 N·m"
-    assert words.number(float("inf")) == "∞"

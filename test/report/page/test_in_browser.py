@@ -1,7 +1,5 @@
 """Pages on a phone, and while the colours of the system change, in a real browser."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Parts of a page: contents, folds, provenance, correlation, sketch, and the plotly.js that it carries."""
 
-from __future__ import annotations
-
 import base64
 import gzip
 import hashlib
@@ -16,11 +14,7 @@ from rsea_ros import report
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.identification.result import Identification
 from rsea_ros.report.diagnosis.figures import part_of, sketch
-from rsea_ros.report.identification import (
-    correlation_finding,
-    correlation_section,
-    identification_report,
-)
+from rsea_ros.report.identification import correlation_finding, correlation_section, identification_report
 from rsea_ros.report.page import VENDOR, Html, fold, packed_plotly, page, section
 from rsea_ros.report.result_files import json_text, provenance_of
 

@@ -1,10 +1,10 @@
-"""Raw codes of devices are recognised in their integers, ordinary columns of integers are not."""
-
-from __future__ import annotations
+"""Columns that are no plain channel: raw codes of devices, coarse clocks, readings without a run."""
 
 import numpy as np
 import pytest
 
+from msg_adapters.tables import load_map, summary
+from msg_adapters.tables.importing import spread_repeats
 from msg_adapters.tables.raw_codes import raw_code
 from rsea_ros.errors import ImportMapError
 
@@ -121,3 +121,99 @@ def test_an_import_of_codes_alone_is_refused(channel, message, files):
     text = "t,k,i\n" + "".join(f"{k / 10},{3 * k},{(k % 21 - 10) % 65536}\n" for k in range(200))
     with pytest.raises(ImportMapError, match=message):
         files(MAP.format(channel), text)
+
+
+def _true_times(rng, count, rate, wander, stalls):
+    """Return sampling times whose rate wanders, with pauses."""
+    phase = np.cumsum(rng.normal(size=count)) / np.sqrt(count)
+    steps = (1 + wander * np.tanh(phase)) / rate
+    steps[rng.integers(0, count, stalls)] += rng.uniform(0.02, 0.2, stalls)
+    return np.cumsum(steps)
+
+
+@pytest.mark.parametrize(("tick", "wander", "stalls"), [(1 / 64, 0.25, 0), (0.01, 0.0, 6), (0.1, 0.25, 6)])
+def test_stamps_come_within_a_sample_of_the_truth(tick, wander, stalls):
+    rng = np.random.default_rng(8)
+    truth = _true_times(rng, 20_000, 400.0, wander, stalls)
+    stamps, report = spread_repeats(np.floor(truth / tick) * tick)
+    error = stamps - truth
+    error -= np.median(error)
+    period = (1 + wander) / 400
+    assert np.all(np.diff(stamps) > 0)
+    near_stall = np.zeros(truth.size, bool)
+    for at in np.flatnonzero(np.diff(truth) > 0.01):
+        near_stall |= np.abs(truth - truth[at]) < 0.2 + 2 * tick
+    assert np.max(np.abs(error[~near_stall])) < 2 * period
+    assert np.std(error[~near_stall]) < 0.5 * period
+    assert np.max(np.abs(error)) < tick + 2 * period
+    assert "stamps repeat" in report
+
+
+@pytest.mark.parametrize("tick", [1 / 64, 0.01, 0.1])
+def test_even_samples_are_dated_far_better_than_their_ticks(tick):
+    truth = 3.0 + np.arange(20_000) / 280.0
+    stamps, report = spread_repeats(np.round(truth / tick) * tick)
+    assert np.max(np.abs(np.diff(stamps) - 1.0 / 280.0)) < 1e-6
+    assert np.max(np.abs(stamps - truth)) < 0.02 * tick
+    assert "fit, 280 Hz" in report
+
+
+def test_a_good_clock_stays_as_it_is():
+    t = np.cumsum(np.random.default_rng(1).uniform(0.5e-3, 1.5e-3, 500))
+    stamps, report = spread_repeats(t)
+    assert stamps is t
+    assert report == ""
+
+
+def test_one_repeated_stamp_moves_nothing_else():
+    t = np.arange(100) * 1e-3
+    t[40] = t[39]
+    stamps, report = spread_repeats(t)
+    others = np.arange(100) != 40
+    assert np.allclose(stamps[others], t[others], rtol=0, atol=1e-12)
+    assert t[39] < stamps[40] < t[41]
+    assert "1 of 100 stamps repeat" in report
+
+
+ANGLES = np.r_[np.arange(-20, 21), np.arange(20, -21, -1)] / 1000
+RUN = "t,i,q\n" + "".join(f"{k / 100},{np.sin(k / 9):.4f},{np.sin(k / 9) / 50:.6f}\n" for k in range(99))
+STATIC = """time: set_points
+channels:
+  deflection: {column: q, unit: rad}
+  command: {column: u, unit: N m}
+  ft: {column: f, unit: N m}
+"""
+MEASURED = """time: {column: t, unit: s}
+channels:
+  motor_torque: {column: i, unit: N m}
+  position: {column: q, unit: rad}
+"""
+
+
+def calibration():
+    rng = np.random.default_rng(0)
+    rows = (f"{q},{200 * q / 6.8},{198 * q + rng.normal(0, 0.02)}" for q in ANGLES)
+    return "q,u,f\n" + "\n".join(rows) + "\n"
+
+
+def test_a_static_calibration_gives_the_stiffness_with_its_interval(files):
+    record = files(STATIC, calibration())
+    line = next(note for note in record.notes if note.startswith("ft over deflection"))
+    slope, half = line.split(": ")[1].split(" N·m/rad")[0].split(" ± ")
+    assert abs(float(slope) - 198) < float(half) < 0.5
+    assert any(note.startswith("ft over command: 6.7") for note in record.notes)
+    assert set(record.channels) == {"deflection", "ft"}  # no verb may take a second a reading for a run
+
+
+def test_what_can_be_done_without_a_run_is_told(files, tmp_path):
+    for text, rows, said in (
+        (STATIC, calibration(), "need the record of a motion"),
+        (MEASURED, RUN, "no command: `check` compares the channels"),
+    ):
+        record = files(text, rows)
+        assert said in " ".join(summary(record, load_map(tmp_path / "map.yaml")))
+
+
+def test_a_map_without_a_time_is_told_what_there_is(files):
+    with pytest.raises(ImportMapError, match=r"expected .* or `set_points` for readings"):
+        files(STATIC.partition("\n")[2], calibration())
