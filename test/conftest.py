@@ -67,9 +67,8 @@ signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 WAITING = (
     "cli/test_demo", "nodes/", "hardware/test_faults", "hardware/test_lost_torque",
-    "hardware/test_protection", "hardware/test_port", "hardware/test_netft", "hardware/test_line",
-    "hardware/test_opening", "hardware/test_same_motor", "hardware/test_series", "hardware/test_encoder",
-    "hardware/test_mit_motor",
+    "hardware/test_protection", "hardware/test_frames", "hardware/test_netft", "hardware/test_line",
+    "hardware/test_same_motor", "hardware/test_series", "hardware/test_mit_motor",
 )  # fmt: skip
 """Files that clocks of nodes and wires judge: the first worker alone takes them, one after the other."""
 
