@@ -64,7 +64,7 @@ def test_excite_interrupted_ends_with_zero_and_a_recording_by_itself_after_its_d
     states = listener.hear(JointState, "/rsea/joint_states", MEASUREMENT)
     plant = start("plant", rig=RIG)
     listener.until(lambda: states)
-    record = start("record", out=tmp_path / "bag", duration=2.0, storage="sqlite3")
+    record = start("record", out=tmp_path / "bag", duration=1.0, storage="sqlite3")
     excite = start("excite", duration=100.0, kind="white_noise", amplitude=5.0, ramp=0.0)
     listener.until(lambda: sum(m.effort[0] != 0.0 for m in commands) > 50)
     assert excite.stop(signal.SIGINT) == 130

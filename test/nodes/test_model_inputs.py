@@ -118,6 +118,17 @@ def test_a_torque_that_is_no_number_is_none(listener, inputs_of):
     assert inputs.ft_silent
 
 
+def test_a_topic_that_falls_silent_is_waited_for_only_so_long(listener, inputs_of, monkeypatch):
+    monkeypatch.setattr("rsea_ros.nodes._joint_inputs.PATIENCE", 0.2)
+    inputs, publishers = inputs_of()
+    feed(listener, inputs, publishers, [(0.0, (0.0, 0.0), 0.01 * k) for k in range(20)])
+    for k in range(20, 60):  # the others go on without ft
+        stamp = round(EPOCH + k * PERIOD)
+        publishers["torque_command"].publish(torque_command_message(stamp, 0.0))
+        publishers["joint_states"].publish(joint_state_message(stamp, 1e-5 * k, 0.0, 0.0))
+    listener.until(lambda: [*inputs.take()] and inputs.ft_silent)
+
+
 def test_states_that_stand_still_while_commands_move_are_noticed(listener, inputs_of):
     """Both sensors had stopped, the one under its own noise, and the flag stayed up."""
     inputs, publishers = inputs_of()
