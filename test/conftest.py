@@ -74,7 +74,7 @@ WAITING = (
 
 PATIENT = (
     "cli/test_run_launch_topics", "nodes/test_identify_diagnosis", "nodes/test_parameters",
-    "nodes/test_policies", "nodes/test_realtime", "watch/test_page", "watch/test_server", "cli/test_bench",
+    "nodes/test_policies", "nodes/test_processes", "watch/test_page", "watch/test_server", "cli/test_bench",
     "cli/test_ctrl_c", "msg_adapters/test_ros",
 )  # fmt: skip
 """Files that wait for processes and are late for nothing: any worker takes them, at the end."""

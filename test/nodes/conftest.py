@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 import rclpy
+from rcl_interfaces.msg import Parameter, ParameterValue
+from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.lifecycle import LifecycleNode
 
@@ -186,14 +188,20 @@ def what_a_test_hears(request):
         listener.forget(kept)
 
 
+DRIVEN = {parameter.name: parameter.default for parameter in driver.TABLE} | {
+    "rate": 200.0, "autostart": True, "resume": True, "command_timeout": 5.0,
+}  # fmt: skip
+"""Parameters of a driver that is active at once, and patient."""
+
+
 @pytest.fixture
 def make_driver(listener):
-    """A function that makes a driver in this process: name, values of its parameters; closed in the end."""
+    """A function that makes a driver in this process, by DRIVEN or other values, and those that are given."""
     made = []
 
-    def make(name, values, overrides=()):
+    def make(name, *overrides, values=None, **given):
         node = LifecycleNode(name, namespace=name, parameter_overrides=list(overrides))
-        made.append((driver.DriverNode(node, values), node))
+        made.append((driver.DriverNode(node, (values or DRIVEN) | given), node))
         listener.serve(node)
         return made[-1]
 
@@ -201,3 +209,24 @@ def make_driver(listener):
     for program, node in made:
         program.close()
         listener.drop(node)
+
+
+DOUBLE = 3
+
+
+@pytest.fixture
+def put(listener):
+    """A function that sets parameters of a node over its service; its answer's reason, empty for none."""
+
+    def ask(node, **values):
+        request = SetParametersAtomically.Request()
+        for name, value in values.items():
+            told = ParameterValue(type=DOUBLE, double_value=value)
+            request.parameters.append(Parameter(name=name.replace("__", "."), value=told))
+        name = node if isinstance(node, str) else node.get_fully_qualified_name()
+        service = f"{name}/set_parameters_atomically"
+        answer = listener.call(service, SetParametersAtomically, request).result
+        assert answer.successful == (not answer.reason)
+        return answer.reason
+
+    return ask

@@ -1,10 +1,6 @@
 """Parameters of running nodes: limits go down at once and up without torque, and a refusal says why."""
 
-from __future__ import annotations
-
 import pytest
-from rcl_interfaces.msg import Parameter, ParameterValue
-from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.lifecycle import LifecycleNode
 
 from msg_adapters.ros import JointState, torque_command_message
@@ -13,8 +9,6 @@ from rsea_ros.nodes._joints import joint_table
 from rsea_ros.nodes._parameters import declare
 from rsea_ros.nodes._qos import COMMAND
 from test.nodes.test_driver import Spy
-
-DOUBLE = 3
 
 
 @pytest.fixture
@@ -42,24 +36,6 @@ def driven(listener, monkeypatch):
     for program, node in made:
         program.close()
         listener.drop(node)
-
-
-@pytest.fixture
-def put(listener):
-    """A function that sets parameters of a node over its service; its answer's reason, empty for none."""
-
-    def ask(node, **values):
-        request = SetParametersAtomically.Request()
-        for name, value in values.items():
-            told = ParameterValue(type=DOUBLE, double_value=value)
-            request.parameters.append(Parameter(name=name.replace("__", "."), value=told))
-        name = node if isinstance(node, str) else node.get_fully_qualified_name()
-        service = f"{name}/set_parameters_atomically"
-        answer = listener.call(service, SetParametersAtomically, request).result
-        assert answer.successful == (not answer.reason)
-        return answer.reason
-
-    return ask
 
 
 def test_a_limit_goes_down_under_torque_and_up_without(driven, put, listener):

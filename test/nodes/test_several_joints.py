@@ -222,7 +222,7 @@ def test_a_joint_that_is_stopped_while_another_one_is_cleared_stays_stopped(make
     """The clear of all joints reached it later than its stop, and ended that: 10 N m after an answer."""
     spies = {"hip": Spy(), "knee": Spy()}
     monkeypatch.setattr(driver, "DEVICES", {"simulated": lambda values: spies[values["joint"]]})
-    program, _ = make_driver("held", values_of(joints=["hip", "knee"], autostart=True, resume=True))
+    program, _ = make_driver("held", values=values_of(joints=["hip", "knee"], autostart=True, resume=True))
     hip, knee = program.joints
     stop([hip, knee])
     for joint in (hip, knee):
