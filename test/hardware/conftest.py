@@ -1,10 +1,8 @@
 """A simulated bench in a process of its own, and the driver's loop without ROS in this one."""
 
-from __future__ import annotations
-
 import math
 import time
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from functools import partial
 
 import pytest
@@ -121,10 +119,9 @@ def device(benches):
     return partial(device_on, benches())
 
 
-@pytest.fixture
-def loop(benches, request):
-    """An enabled loop that commands 10 N m, on the bench of the model that the test asks for."""
-    bench = benches(getattr(request, "param", 54024))
+@contextmanager
+def driven(bench):
+    """Yield an enabled loop on a bench that behaves well, which commands 10 N m."""
     well_behaved(bench)
     running = Loop(bench)
     running.guarded.enable()
@@ -133,6 +130,13 @@ def loop(benches, request):
     yield running
     well_behaved(bench)
     running.close()
+
+
+@pytest.fixture
+def loop(benches, request):
+    """Such a loop on the bench of the model that the test asks for."""
+    with driven(benches(getattr(request, "param", 54024))) as running:
+        yield running
 
 
 def well_behaved(bench):

@@ -3,6 +3,7 @@
 import itertools
 import os
 import random
+import select
 import time
 import tty
 from contextlib import suppress
@@ -154,7 +155,7 @@ def test_without_a_reply_nothing_is_returned_after_the_time_out(wire):
 def test_bytes_that_came_before_are_discarded(wire):
     port, near = wire
     os.write(near, b"older")
-    time.sleep(0.05)
+    assert select.select([port.descriptor], [], [], 10.0)[0], "they have come"
     port.clearPort()
     os.write(near, b"new")
     assert receive_all(port, 3) == b"new"

@@ -172,11 +172,12 @@ def test_two_drives_of_one_id_are_refused_and_noticed(virtual):
     motor.open()
     motor.enable()
     bus.drives.append(EmulatedDrive("AK10-9", Mass()))
-    for _ in range(6):
+
+    def noticed():
         motor.write(1.0)
-        sample = motor.read()
-        time.sleep(0.01)
-    assert "two drives" in sample.trouble and motor.health()["bus_twice"] >= 3
+        return "two drives" in motor.read().trouble and motor.health()["bus_twice"] >= 3
+
+    until(noticed)
     del bus.drives[0]
     motor.close()
 
@@ -231,13 +232,10 @@ def test_a_controller_that_is_bus_off_is_a_lost_port(virtual):
     motor.open()
     motor.enable()
     bus.tell(0x08, bytes(8), error=True)  # a bus error alone is counted
-    time.sleep(0.02)
-    motor.read()
-    assert motor.health()["bus_error_frames"] == 1
+    until(lambda: motor.read() and motor.health()["bus_error_frames"] == 1)
     bus.tell(0x40, bytes(8), error=True)
-    time.sleep(0.02)
     with pytest.raises(PortLost, match="bus-off"):
-        motor.read()
+        until(lambda: motor.read() and False)
     motor.recover()
     assert bus.plants[0].torque == 0.0 and not bus.drives[0].get("torque_enable")
     motor.close()
@@ -279,22 +277,6 @@ def test_the_frames_for_a_supervisor_on_socketcan_are_the_kernels():
     assert port.wire(Frame(7, bytes(range(8)))) == b"\x07\0\0\0\x08\0\0\0" + bytes(range(8))
     assert port.wire(Frame(0x0400FD07, bytes(8), True))[:8] == b"\x07\xfd\x00\x84\x08\0\0\0"
     assert port.wire(Frame(0x020007FD, b"", True), whole=False) == b"\xfd\x07\x00\x82\x08\0\0\0"
-
-
-@pytest.mark.parametrize(
-    ("loop", "cause", "service"),
-    [
-        ("DM8009", "hardware_error: communication lost", "reboot"),
-        ("RS03", "motor_state: state is reset", "clear"),
-    ],
-    indirect=["loop"],
-)
-def test_the_drives_own_watchdog_ends_the_torque_of_a_driver_that_hangs(loop, cause, service):
-    assert loop.bench.torque()[1]
-    until(lambda: loop.bench.torque() == (0, False))
-    assert loop.until_fault(10.0) <= 2 and str(loop.guarded.fault).startswith(cause)
-    getattr(loop.guarded, service)()
-    assert loop.cycles(3, 10.0) == [10.0] * 3 and loop.bench.torque()[1]
 
 
 @pytest.mark.parametrize("model", ("AK10-9", "mini-cheetah"))

@@ -82,7 +82,7 @@ def test_a_supervised_toy_is_stopped_when_the_driver_hangs(toy):
 
 def test_a_long_reboot_under_torque_is_not_taken_for_a_hang(toy):
     """Only the motor told the supervisor that its torque was off: one that was being set up was stopped."""
-    device, loop = driven(toy, supervised="yes", boot="0.3")
+    device, loop = driven(toy, supervised="yes", watchdog=0.2, boot="0.5")
     loop.reboot()
     loop.cycle(10.0, 0.0)
     device.far.setblocking(False)
