@@ -17,7 +17,6 @@ from rclpy.lifecycle import LifecycleNode
 from msg_adapters.ros import Trigger
 from rsea_ros.nodes import driver
 from rsea_ros.nodes._run import PROFILE
-from test.nodes.stalls import every
 from test.nodes.warm import parent
 
 HERE = Path(__file__).resolve().parent
@@ -120,13 +119,23 @@ class Listener:
         self._executor.remove_node(node)
         node.destroy_node()
 
-    def until(self, condition):
-        """Spin until the condition holds, and return what it returned."""
-        deadline = time.monotonic() + TIMEOUT
-        while not (result := condition()):
-            assert time.monotonic() < deadline, "waited in vain"
+    def until(self, condition, act=lambda: None, mend=lambda: None, pause=1.5):
+        """Spin until the condition holds, and return what it returned.
+
+        act: done before each look, such as to command. mend: done once in `pause` s, such as to clear what a
+        machine that stalls has latched.
+        """
+        begun = mended = time.monotonic()
+        while True:
+            act()
+            if result := condition():
+                return result
+            now = time.monotonic()
+            assert now < begun + TIMEOUT, "waited in vain"
+            if now > mended + pause:
+                mended = now
+                mend()
             self._executor.spin_once(timeout_sec=0.01)  # conditions that command are heard in time
-        return result
 
     def call(self, name, kind=Trigger, request=None):
         """Call a service; return its answer.
@@ -143,13 +152,8 @@ class Listener:
             answers.append(client.call_async(request or kind.Request()))
 
         ask()
-        ask_again = every(AGAIN, ask)
-
-        def answered():
-            ask_again()
-            return next((answer for answer in answers if answer.done()), None)
-
-        return self.until(answered).result()
+        done = self.until(lambda: next((a for a in answers if a.done()), None), mend=ask, pause=AGAIN)
+        return done.result()
 
     def hear(self, kind, topic, qos):
         """Return a list that fills with the messages of a topic."""

@@ -15,52 +15,40 @@ from std_msgs.msg import Float64MultiArray, MultiArrayDimension, MultiArrayLayou
 
 from msg_adapters.ros import OK, WARN, JointState, Trigger, WrenchStamped, stamp_of, torque_command_message
 from msg_adapters.topic_map import FLOATS
-from rsea_ros.hardware.device import NoReply, State
+from rsea_ros.hardware.device import NoReply
 from rsea_ros.hardware.protection import PROCESS, Protection
 from rsea_ros.nodes import driver
 from rsea_ros.nodes._bench_topics import MOST, NAMES, BenchTopics
 from rsea_ros.nodes._cycle import Anchor
 from rsea_ros.nodes._qos import COMMAND, LATCHED, MEASUREMENT
 from rsea_ros.nodes.model import Flags
+from test.nodes.monitor import FakeMotor
 
 
-class Spy:
-    """A device that keeps what is written to it; `fault` is raised by the next reading."""
+class Spy(FakeMotor):
+    """A motor that keeps what is written to it; `fault` is raised by the next reading."""
 
     protection = Protection(PROCESS)
 
     def __init__(self):
+        super().__init__()
         self.written, self.opened, self.fault = [], False, None
+
+    def _reached(self, moment):
+        super()._reached(moment)
+        if moment in ("read", "recover") and self.fault is not None:
+            raise self.fault
 
     def open(self):
         self.opened = True
 
-    def read(self):
-        if self.fault is not None:
-            raise self.fault
-        return State(0, 0.0, 0.0, 0.0)
-
     def write(self, torque):
+        super().write(torque)
         self.written.append(torque)
 
-    def enable(self):
-        self.on = True
-
     def disable(self):
+        super().disable()
         self.written.append(0.0)
-        self.on = False
-
-    def zero_ft(self):
-        self.zeroed = True
-
-    def recover(self):
-        if self.fault is not None:
-            raise self.fault
-
-    reboot = recover
-
-    def health(self):
-        return {}
 
     def close(self):
         if self.opened:
@@ -75,12 +63,7 @@ def spied(listener, make_driver, monkeypatch):
     monkeypatch.setattr(driver, "DEVICES", {"simulated": lambda values: spy})
     program, node = make_driver("spied")
     publisher = listener.node.create_publisher(JointState, "/spied/torque_command", COMMAND)
-
-    def push_commands():
-        publisher.publish(torque_command_message(0, 5.0))
-        return 5.0 in spy.written
-
-    listener.until(push_commands)
+    listener.until(lambda: 5.0 in spy.written, lambda: publisher.publish(torque_command_message(0, 5.0)))
     return spy, program, node
 
 
@@ -351,12 +334,10 @@ def test_the_deflection_is_published_also_as_an_ft_marked_as_such(toy, listener)
     wrenches = listener.hear(WrenchStamped, "/toy/ft", MEASUREMENT)
     deflections = listener.hear(JointState, "/toy/deflection", MEASUREMENT)
     commands = listener.node.create_publisher(JointState, "/toy/torque_command", COMMAND)
-
-    def push_commands():
-        commands.publish(torque_command_message(0, 10.0))
+    def is_bent():
         return wrenches and wrenches[-1].wrench.torque.y < -15.0 and deflections[-1].position[0] > 0.0099
 
-    listener.until(push_commands)
+    listener.until(is_bent, lambda: commands.publish(torque_command_message(0, 10.0)))
     assert (deflections[-1].name, list(deflections[-1].position)) == (["joint"], [0.01])
     assert not deflections[-1].velocity and deflections[-1].header.frame_id == "spring_deflection"
     assert wrenches[-1].wrench.torque.z == 0.0, "torque.z"

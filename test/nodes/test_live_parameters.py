@@ -43,11 +43,8 @@ def test_a_limit_goes_down_under_torque_and_up_without(driven, put, listener):
     commands = listener.node.create_publisher(JointState, "/changed/torque_command", COMMAND)
 
     def until_written(torque):
-        def is_written():
-            commands.publish(torque_command_message(0, 5.0))
-            return spy.written and spy.written[-1] == torque
-
-        listener.until(is_written)
+        command = lambda: commands.publish(torque_command_message(0, 5.0))  # noqa: E731
+        listener.until(lambda: spy.written and spy.written[-1] == torque, command)
 
     until_written(5.0)
     assert put(node, torque_limit=2.0) == ""

@@ -131,7 +131,6 @@ def test_the_estimate_survives_a_loss_of_ft_and_its_return_without_a_jump(heard,
             state.publish(joint_state_message(int(stamps[k]), *values))
             if with_ft:
                 ft.publish(wrench_of(k))
-            listener.until(lambda: True)
 
     def newest(k):
         """Wait for the estimate at a sample and return it."""
