@@ -3,7 +3,6 @@
 import math
 import time
 from contextlib import contextmanager, suppress
-from functools import partial
 
 import pytest
 
@@ -113,10 +112,19 @@ def benches(tmp_path_factory):
 
 
 @pytest.fixture
-def device(benches):
-    """A function that makes the driver's device on the bench of 54024, which behaves well."""
-    well_behaved(benches())
-    return partial(device_on, benches())
+def device():
+    """A device that logs its calls."""
+    from test.hardware.logged_device import Device  # not where test_lost_torque runs a Loop without pytest
+
+    return Device()
+
+
+@pytest.fixture
+def joint(device):
+    """It behind its limits, open and enabled."""
+    from test.hardware.logged_device import guard
+
+    return guard(device)
 
 
 @contextmanager

@@ -169,25 +169,28 @@ def test_each_series_makes_the_torque_and_says_what_it_is(benches, model):
     assert bench.torque() == (0, False)
 
 
-@pytest.mark.parametrize(
-    ("values", "told"),
-    [
-        ({"drive_mode": 8}, "drive_mode 8: a goal that is written switches its torque on, expected 0"),
-        ({"startup": 1}, "startup 1: its torque is on when the power comes, expected 0"),
-        ({"temperature_limit": 60}, "temperature_limit = 70 °C, expected at most 60 °C"),
-        ({"max_voltage": 85}, "voltage_limit = 9 V, expected less than 8.5 V"),
-        ({"torque_limit": 300}, "torque_limit = 2 N·m, expected at most 1.439 N·m, the motor's own limit"),
-    ],
-)
-def test_the_settings_of_the_motor_are_compared_with_the_drivers_limits(benches, values, told):
-    bench = benches(1020)
-    usual = {"drive_mode": 0, "startup": 0, "temperature_limit": 80, "max_voltage": 160, "torque_limit": 1193}
-    bench.ask("set", **values)
+UNFIT = {
+    "drive_mode 8: a goal that is written switches its torque on, expected 0": (1020, {"drive_mode": 8}, 0),
+    "startup 1: its torque is on when the power comes, expected 0": (1020, {"startup": 1}, 0),
+    "temperature_limit = 70 °C, expected at most 60 °C": (1020, {"temperature_limit": 60}, 80),
+    "voltage_limit = 9 V, expected less than 8.5 V": (1020, {"max_voltage": 85}, 160),
+    "torque_limit = 2 N·m, expected at most 1.439 N·m, the motor's own": (1020, {"torque_limit": 300}, 1193),
+    "torque_constant = 0, expected N·m/A: no source gives": (2120, {"number": 2100}, 2120),
+    "model 1060, expected one of .*1020.*54024": (54024, {"number": 1060}, 54024),
+}
+"""What is said of a motor, its model, one of its values, and what that is otherwise."""
+
+
+@pytest.mark.parametrize("told", UNFIT)
+def test_what_a_motor_is_and_keeps_must_fit_the_drivers_limits(benches, told):
+    model, wrong, usual = UNFIT[told]
+    bench, what = benches(model), "model" if "number" in wrong else "set"
+    bench.ask(what, **wrong)
     try:
         with pytest.raises(RseaError, match=told):
             device_on(bench, SMALL).open()
     finally:
-        bench.ask("set", **{name: usual[name] for name in values})
+        bench.ask(what, **dict.fromkeys(wrong, usual))
     assert bench.torque() == (0, False)
 
 
@@ -221,16 +224,6 @@ def test_angles_count_from_configure_or_from_the_motors_zero_with_its_homing_off
     assert float(offset) == pytest.approx(-math.pi / 2.0, rel=1e-4)
 
 
-def test_a_motor_without_a_known_constant_needs_one(benches):
-    bench = benches(2120)
-    bench.ask("model", number=2100)
-    try:
-        with pytest.raises(RseaError, match="torque_constant = 0, expected N·m/A: no source gives"):
-            device_on(bench, SMALL).open()
-    finally:
-        bench.ask("model", number=2120)
-
-
 WRONG = {
     "another model": ({"model": 54025}, Limits(68.0), "model 54024, expected 54025"),
     "another ID": ({"identity": 7}, Limits(68.0), "motor ID 7 on .*: no reply to ping"),
@@ -240,10 +233,10 @@ WRONG = {
 
 
 @pytest.mark.parametrize("name", WRONG)
-def test_settings_that_do_not_fit_the_machine_are_refused(benches, device, name):
+def test_settings_that_do_not_fit_the_machine_are_refused(benches, name):
     motor, limits, message = WRONG[name]
     with pytest.raises(RseaError, match=message):
-        device(limits, **motor).open()
+        device_on(benches(), limits, **motor).open()
     assert benches().torque() == (0, False)
 
 
@@ -253,21 +246,11 @@ def test_a_port_that_does_not_exist_is_named(tmp_path):
         port.open()
 
 
-def test_an_unknown_model_is_refused_by_its_number(benches, device):
-    bench = benches()
-    bench.ask("model", number=1060)
-    try:
-        with pytest.raises(RseaError, match=r"model 1060, expected one of .*1020.*54024"):
-            device().open()
-    finally:
-        bench.ask("model", number=54024)
-
-
-def test_a_sensor_without_a_stream_is_refused_and_the_motor_left_off(benches, device, monkeypatch):
+def test_a_sensor_without_a_stream_is_refused_and_the_motor_left_off(benches, monkeypatch):
     monkeypatch.setattr("rsea_ros.hardware.netft.sensor.FIRST", 0.3)
     bench = benches()
     bench.ask("misbehave", ft_silent=True)
     with pytest.raises(RseaError, match=r"no record within 0\.3 s, expected a stream"):
-        device().open()
+        device_on(bench).open()
     bench.ask("misbehave", ft_silent=False)
     assert bench.torque() == (0, False)

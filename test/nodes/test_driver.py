@@ -24,6 +24,8 @@ from rsea_ros.nodes._qos import COMMAND, LATCHED, MEASUREMENT
 from rsea_ros.nodes.model import Flags
 from test.nodes.monitor import FakeMotor
 
+SERVES = True
+
 
 class Spy(FakeMotor):
     """A motor that keeps what is written to it; `fault` is raised by the next reading."""

@@ -28,16 +28,22 @@ READ = InputSettings(0.02, "torque.z", True)
 EPOCH, PERIOD = 1_700_000_000_000_000_000, 1e9 / 280.0
 
 
+def publish(publishers, k, command, state, torque=None):
+    """Publish sample k: command, (position, effort) and torque, None without ft."""
+    stamp = round(EPOCH + k * PERIOD)
+    publishers["torque_command"].publish(torque_command_message(stamp, command))
+    publishers["joint_states"].publish(joint_state_message(stamp, state[0], 0.0, state[1]))
+    if torque is not None:
+        publishers["ft"].publish(wrench_message(stamp, (0.0,) * 5 + (torque,)))
+
+
 def feed(listener, inputs, publishers, samples):
-    """Publish samples of command, (position, effort) and torque; return the estimates."""
+    """Publish samples and return the estimates."""
     estimates = []
     for start in range(0, len(samples), 20):
         some, before = samples[start : start + 20], len(estimates)
-        for k, (command, state, torque) in enumerate(some, start):
-            stamp = round(EPOCH + k * PERIOD)
-            publishers["torque_command"].publish(torque_command_message(stamp, command))
-            publishers["joint_states"].publish(joint_state_message(stamp, state[0], 0.0, state[1]))
-            publishers["ft"].publish(wrench_message(stamp, (0.0,) * 5 + (torque,)))
+        for k, sample in enumerate(some, start):
+            publish(publishers, k, *sample)
 
         def has_arrived():
             estimates.extend(estimate for _, estimate in inputs.take())
@@ -115,10 +121,7 @@ def test_a_torque_that_is_no_number_is_none(listener, inputs_of):
     feed(listener, inputs, publishers, [(0.0, (0.0, 0.0), 0.01 * k) for k in range(20)])
     assert not inputs.ft_silent
     for k, torque in enumerate([math.nan] * 15 + [1e300] * 15, 20):
-        stamp = round(EPOCH + k * PERIOD)
-        publishers["torque_command"].publish(torque_command_message(stamp, 0.0))
-        publishers["joint_states"].publish(joint_state_message(stamp, 0.0, 0.0, 0.0))
-        publishers["ft"].publish(wrench_message(stamp, (0.0,) * 5 + (torque,)))
+        publish(publishers, k, 0.0, (0.0, 0.0), torque)
     listener.until(lambda: [*inputs.take()] and inputs.refused >= 30)
     assert inputs.ft_silent
 
@@ -127,10 +130,8 @@ def test_a_topic_that_falls_silent_is_waited_for_only_so_long(listener, inputs_o
     monkeypatch.setattr("rsea_ros.nodes._joint_inputs.PATIENCE", 0.2)
     inputs, publishers = inputs_of()
     feed(listener, inputs, publishers, [(0.0, (0.0, 0.0), 0.01 * k) for k in range(20)])
-    for k in range(20, 60):  # the others go on without ft
-        stamp = round(EPOCH + k * PERIOD)
-        publishers["torque_command"].publish(torque_command_message(stamp, 0.0))
-        publishers["joint_states"].publish(joint_state_message(stamp, 1e-5 * k, 0.0, 0.0))
+    for k in range(20, 60):  # the others go on
+        publish(publishers, k, 0.0, (1e-5 * k, 0.0))
     listener.until(lambda: [*inputs.take()] and inputs.ft_silent)
 
 

@@ -21,6 +21,7 @@ from test.nodes.stalls import is_stall
 from test.nodes.test_driver import Spy
 from test.nodes.warm import Bench
 
+SERVES = True
 JOINTS = ("hip", "knee", "ankle")
 TRIALS = 10
 X = {
