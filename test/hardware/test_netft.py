@@ -358,9 +358,11 @@ def test_a_page_without_a_calibration_is_one_line(case):
     ("head", "drop"), [([HEAD + b"\r\n"], b" "), ([b""], b"")], ids=["dripping body", "silence"]
 )
 def test_a_page_that_drips_ends_in_time(head, drop):
-    page = serve(head, itertools.repeat(drop, 500), pause=0.02)  # 10 s
+    sent = []
+    page = serve(head, (sent.append(drop) or drop for _ in range(500)), pause=0.02)  # 10 s
     with page as (port, _), pytest.raises(DeviceError, match=r"no whole answer within 0.2 s"):
         calibration.fetch("127.0.0.1", port, timeout=0.2)
+    assert len(sent) < 60, "in 1.2 s at least"
 
 
 def test_an_endless_page_is_abandoned_at_the_size_limit(monkeypatch):

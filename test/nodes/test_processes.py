@@ -43,19 +43,18 @@ class Stuck(Program):
             time.sleep(1e6)
         return False
 
-sys.exit(Component("stuck", (), Stuck, patience=0.5).run())
+sys.exit(Component("stuck", (), Stuck, patience={patience}).run())
 """
 
 
 def test_a_node_without_unfinished_work_ends_after_its_patience():
     """model outlived SIGINT until SIGKILL, and nobody knew where."""
-    programs = {
-        stuck: subprocess.Popen(
-            [sys.executable, "-c", STUCK.format(stuck=stuck)], cwd=ROOT, stderr=subprocess.PIPE, text=True
-        )
-        for stuck in (True, False)
-    }
-    for stuck, process in programs.items():
+    programs = []
+    for stuck, patience in ((True, 0.5), (False, 30.0)):
+        command = [sys.executable, "-c", STUCK.format(stuck=stuck, patience=patience)]
+        process = subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, text=True)
+        programs.append((stuck, process))
+    for stuck, process in programs:
         assert "looked" in process.stderr.readline()
         process.send_signal(signal.SIGINT)
         said = process.communicate(timeout=50.0)[1]
