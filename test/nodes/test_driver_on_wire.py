@@ -195,8 +195,7 @@ watchdog, which leaves a Dynamixel on at zero."""
 def test_after_a_kill_the_torque_is_zero_on_the_wire(bench, start, listener):
     names = {model: f"killed_{model}".lower().replace("-", "_") for model in KILLED}
     victims = {model: Driven(bench(model), listener, names[model], start) for model in KILLED}
-    for victim in victims.values():
-        victim.drive()
-    for model, (number, end) in KILLED.items():
+    for model, (number, end) in KILLED.items():  # they begin together, and none waits for commands
+        victims[model].drive()
         assert victims[model].process.stop(number) == (0 if number == signal.SIGINT else -number), model
         listener.until(lambda model=model, end=end: victims[model].goal() == end)
