@@ -67,15 +67,14 @@ signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 WAITING = (
     "cli/test_demo", "nodes/", "hardware/test_faults", "hardware/test_lost_torque",
-    "hardware/test_protection", "hardware/test_port", "hardware/test_netft", "hardware/test_line",
-    "hardware/test_opening", "hardware/test_same_motor", "hardware/test_series", "hardware/test_encoder",
-    "hardware/test_mit_motor",
+    "hardware/test_protection", "hardware/test_frames", "hardware/test_netft", "hardware/test_line",
+    "hardware/test_same_motor", "hardware/test_series", "hardware/test_mit_motor",
 )  # fmt: skip
 """Files that clocks of nodes and wires judge: the first worker alone takes them, one after the other."""
 
 PATIENT = (
     "cli/test_run_launch_topics", "nodes/test_identify_diagnosis", "nodes/test_parameters",
-    "nodes/test_policies", "nodes/test_realtime", "watch/test_page", "watch/test_server", "cli/test_bench",
+    "nodes/test_policies", "nodes/test_processes", "watch/test_page", "watch/test_server", "cli/test_bench",
     "cli/test_ctrl_c", "msg_adapters/test_cdr",
 )  # fmt: skip
 """Files that wait for processes and are late for nothing: any worker takes them, at the end."""

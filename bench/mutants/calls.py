@@ -33,7 +33,7 @@ spec.loader.exec_module(sys.modules["recorder"])
 """
 WAIT = (
     "test/nodes/", "test/watch/", "test/cli/test_demo", "test/cli/test_run_launch",
-    *(f"test/hardware/test_{name}" for name in ("faults", "lost", "port", "netft", "line")),
+    *(f"test/hardware/test_{name}" for name in ("faults", "lost", "frames", "netft", "line")),
 )  # fmt: skip
 """Tests that wait for nodes and wires."""
 LONGEST = 1500.0

@@ -1,17 +1,16 @@
 """How torque follows sines: its phase, continuous from where it is followed."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from rsea_ros.control import following
 from rsea_ros.control.following import ControlTrace, Following, fall
-from rsea_ros.control.law import Gains
-from rsea_ros.control.synthesis import ControllerDesign
-from rsea_ros.model.rig_file import load_rig
 from rsea_ros.report.figures.figure import AFTER
 from rsea_ros.report.figures.response import ResponseCurve, response_figure
+from test.control.benches import DESIGN, RIG
 
 HZ = np.array([1.0, 2.0, 5.0, 10.0, 20.0, 50.0])
 FOLLOWED = np.array([1.0, 1.0, 0.7, 0.2]) * np.exp(-1j * np.radians([0.0, 5.0, 100.0, 200.0]))
@@ -54,8 +53,8 @@ def test_the_error_of_a_run_is_that_behind_its_settling():
     assert str(run) == "ControlTrace(4 samples, 3 s, at most 7 N·m)"
 
 
-RIG, RATE = load_rig("paper_high_impedance"), 500.0
-DESIGN = ControllerDesign(Gains(0.2575, 0.003029, 1.195, 6.99, 42.9), RATE, {}, 0.1)
+RATE = 500.0
+AT_500 = replace(DESIGN, rate=RATE)
 
 
 def played(monkeypatch, answer):
@@ -78,7 +77,7 @@ def test_a_step_has_the_rise_and_the_settling_of_its_exponential(monkeypatch):
             return 5.0 * (1.0 - (1.0 - 5.0 * over * since / lag) * np.exp(-since / lag))
 
         played(monkeypatch, answer)
-        step = following.step_response(RIG, RIG, DESIGN, late=2)
+        step = following.step_response(RIG, RIG, AT_500, late=2)
         assert step.t[0] == 0.0 and len(step.t) == 600 and step.ft[-1] == pytest.approx(5.0, rel=1e-3)
         if not over:
             assert step.rise == pytest.approx(lag * math.log(9.0), abs=2.0 / RATE) and step.overshoot < 1e-9
@@ -96,7 +95,7 @@ def test_sines_that_come_three_samples_late_have_that_phase_and_gain(monkeypatch
         return np.where(t < 0.7 - 1e-9, 1e3, late)
 
     played(monkeypatch, answer)
-    shown = following.follow(RIG, RIG, DESIGN, late=2)
+    shown = following.follow(RIG, RIG, AT_500, late=2)
     assert shown.hz.tolist() == [1, 2, 3, 5, 10, 15, 20, 27, 35, 50, 70, 120, 200], "up to 0.46 of the rate"
     expected = 0.8 * np.exp(-2j * np.pi * shown.hz * 3.0 / RATE)
     np.testing.assert_allclose(shown.torque, expected, atol=0.04)

@@ -1,13 +1,11 @@
 """What is learned while the bench runs equals regressions over the whole past, and what is put in."""
 
-from __future__ import annotations
-
 import math
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scipy.signal import cont2discrete, dlsim, lfilter
+from scipy.signal import cont2discrete, lfilter
 
 from rsea_ros.control.learning import LOCKED, Learning, Stretch, Yielding, _within
 
@@ -25,7 +23,7 @@ def wave(*hz, phase=0.0):
     return sum(np.sin(2.0 * np.pi * f * T + phase + k) for k, f in enumerate(hz))
 
 
-def test_a_spring_stretches_as_its_equation_says() -> None:
+def test_a_spring_stretches_as_its_equation_says():
     """B phi' + K phi = T, integrated with a thousand steps to a sample."""
     spring = Stretch(K, B, H)
     spring.start(30.0)
@@ -45,24 +43,11 @@ def test_a_spring_stretches_as_its_equation_says() -> None:
 def parts_of(mean):
     """Return s T / (s + w)^2 and w s T / (s + w)^3, w of 1.5 Hz, of a torque that is held in each sample."""
     w = 3.0 * math.pi
-    found = []
-    for numerator, denominator in (([1.0, 0.0], np.poly([-w] * 2)), ([w, 0.0], np.poly([-w] * 3))):
-        a, b, c, d, _ = cont2discrete(tf2ss(numerator, denominator), H)
-        _, y, _ = dlsim((a, b, c, d, H), np.append(mean, 0.0))
-        found.append(y[1:, 0])
-    return np.array(found)
+    held = [cont2discrete((n, np.poly([-w] * order)), H)[:2] for n, order in (([1.0, 0.0], 2), ([w, 0.0], 3))]
+    return np.array([lfilter(top.ravel(), bottom, np.append(mean, 0.0))[1:] for top, bottom in held])
 
 
-def tf2ss(numerator, denominator):
-    n = len(denominator) - 1
-    a = np.diag(np.ones(n - 1), 1)
-    a[-1] = -denominator[:0:-1]
-    c = np.zeros((1, n))
-    c[0, : len(numerator)] = numerator[::-1]
-    return a, np.eye(n)[:, -1:], c, np.zeros((1, 1))
-
-
-def test_what_follows_the_load_is_that_of_its_transfer_functions() -> None:
+def test_what_follows_the_load_is_that_of_its_transfer_functions():
     torque, yielding = wave(2.0, 7.0), Yielding(H)
     expected = parts_of(torque)
     for k, u in enumerate(torque[:400]):
@@ -106,7 +91,7 @@ def regression(rows, y, known, spreads, floor, until):
     return np.linalg.lstsq(np.vstack([x, np.diag(prior)]), np.append(y, prior * known), rcond=None)[0]
 
 
-def test_load_drive_and_torque_that_acted_are_regressions_with_forgetting_over_the_past() -> None:
+def test_load_drive_and_torque_that_acted_are_regressions_with_forgetting_over_the_past():
     theta, drive, acting = (1.05, 2.0, 0.3), (1.0, 5.0, 0.8), (0.8, 3.5, 1.5)
     ft, velocity, torque, acted, (load_rows, rows) = signals(theta, drive, acting, gap=0.02)
     learns = learning()
@@ -126,7 +111,7 @@ def test_load_drive_and_torque_that_acted_are_regressions_with_forgetting_over_t
         assert min(np.abs(learned - x).max() for x in fits) < 1e-4
 
 
-def test_a_torque_that_acted_as_commanded_is_learned_once_and_an_unsure_one_never() -> None:
+def test_a_torque_that_acted_as_commanded_is_learned_once_and_an_unsure_one_never():
     ft, velocity, torque, _, _ = signals((1.0, 0.0, 0.0), (1.0, 5.0, 0.8), (1.0, 5.0, 0.8))
     same, unsure, still = learning(), learning(), learning()
     for k in range(400):
@@ -138,7 +123,7 @@ def test_a_torque_that_acted_as_commanded_is_learned_once_and_an_unsure_one_neve
         assert nothing.load is LOCKED and nothing.drive.tolist() == [J, DAMPING, 0.0]
 
 
-def test_a_load_that_stops_is_forgotten() -> None:
+def test_a_load_that_stops_is_forgotten():
     ft, velocity, torque, acted, _ = signals((1.0, 2.0, 0.0), (J, DAMPING, 0.0), (J, DAMPING, 0.0))
     spring, learns = Stretch(K, B, H), learning()
     for k in range(700):
@@ -156,7 +141,7 @@ def test_a_load_that_stops_is_forgotten() -> None:
     assert max(was[round(0.2 / H) :]) < 0.2
 
 
-def test_a_pendulum_near_its_own_frequency_has_a_negative_part_nothing_else_has() -> None:
+def test_a_pendulum_near_its_own_frequency_has_a_negative_part_nothing_else_has():
     swinging, locked = learning(), learning()
     for learns, theta in ((swinging, (1.0, -8.0, 20.0)), (locked, (1.0, -1.0, 1.0))):
         ft, velocity, torque, acted, _ = signals(theta, (J, DAMPING, 0.0), (J, DAMPING, 0.0))
@@ -175,7 +160,7 @@ def test_a_pendulum_near_its_own_frequency_has_a_negative_part_nothing_else_has(
         ([-9.0, 9.0], [-2.0, 3.0]),
     ],
 )
-def test_what_exceeds_its_bound_is_set_to_it_and_the_rest_is_solved_anew(right, solution) -> None:
+def test_what_exceeds_its_bound_is_set_to_it_and_the_rest_is_solved_anew(right, solution):
     matrix = np.array([[2.0, 1.0], [1.0, 2.0]])
     inside = _within(matrix, np.array(right), np.array([-2.0, -3.0]), np.array([2.0, 3.0]))
     assert inside == pytest.approx(solution)

@@ -8,18 +8,16 @@ import numpy as np
 import pytest
 
 from rsea_ros.control.controller import Measurement, TorqueController
-from rsea_ros.control.law import Gains
+from rsea_ros.control.following import reading
 from rsea_ros.control.polarity import Polarity
 from rsea_ros.control.sign_change import SignChange
 from rsea_ros.control.sign_evidence import SignEvidence
 from rsea_ros.model.rig import EffectSetting
-from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import Plant
+from test.control.benches import FREE, GAINS, RATE, RIG, play, wave
 
-RATE, LIMIT = 280.0, 68.0
-"""Of config/nodes/controller.yaml: Hz, N m."""
-RIG, FREE = load_rig("paper_high_impedance"), load_rig("paper_moving_output")
-GAINS = Gains(0.2575, 0.003029, 1.195, 6.99, 42.9)
+LIMIT = 68.0
+"""N m, of config/nodes/controller.yaml."""
 RUB = EffectSetting("coulomb_friction", {"torque": 3.0})
 RIPPLE = EffectSetting("torque_ripple", {"amplitude": 3.0, "cycles_per_revolution": 4.0, "phase": 0.7})
 BENCHES = {
@@ -39,20 +37,23 @@ WRONG = {
 }
 
 
-def measured(sample, factors):
-    reading = Measurement(sample.ft, sample.velocity, sample.position, sample.motor_torque)
-    return replace(reading, **{name: by * getattr(reading, name) for name, by in factors.items()})
+def falsified(read, factors):
+    return replace(read, **{name: by * getattr(read, name) for name, by in factors.items()})
 
 
-def probe(rig, factors, *, desired=0.0, seconds=4.0, command=1.0, seed=0):
+def probe(bench, factors, *, desired=0.0, seconds=4.0, command=1.0, seed=0, rig=RIG, limit=LIMIT):
     """Return the polarity once it has decided, and the largest torque that was commanded, N m."""
-    plant, polarity, torque, largest = Plant(rig, RATE, seed=seed), Polarity(RIG, RATE, LIMIT), 0.0, 0.0
-    for _ in range(round(seconds * RATE)):
-        after = polarity.probe(measured(plant.step(command * torque), factors), desired)
-        if after is None or polarity.contradiction:
-            break
-        torque, largest = after, max(largest, abs(after))
-    return polarity, largest
+    polarity, sent = Polarity(rig, RATE, limit), []
+
+    def answer(k, read):
+        torque = polarity.probe(falsified(read, factors), desired)
+        if torque is None or polarity.contradiction:
+            return None
+        sent.append(abs(torque))
+        return command * torque
+
+    play(bench, round(seconds * RATE), answer, seed=seed)
+    return polarity, max(sent, default=0.0)
 
 
 @pytest.mark.parametrize("name", BENCHES)
@@ -70,9 +71,9 @@ def test_samples_that_waited_together_are_held_against_the_command_that_acted():
         polarity, torque, k = Polarity(FREE, RATE, LIMIT), 0.0, 0
         while k < 5 * RATE and torque is not None:
             together = dice.randrange(2, 60) if dice.random() < 0.1 else 1
-            readings = [measured(plant.step(torque), {}) for _ in range(together)]
-            for left, reading in zip(range(together)[::-1], readings, strict=True):
-                torque = polarity.probe(reading, 0.0, acts=not left)
+            readings = [reading(plant.step(torque)) for _ in range(together)]
+            for left, read in zip(range(together)[::-1], readings, strict=True):
+                torque = polarity.probe(read, 0.0, acts=not left)
             k += together
             assert not polarity.contradiction, seed
 
@@ -126,13 +127,8 @@ def test_a_gear_that_sticks_beneath_the_noise_of_its_encoder_has_not_moved():
     rig = replace(RIG, sensors=RIG.sensors | {"position": coarse, "velocity": hasty})
     decided = []
     for seed in range(11, 19):  # of which the noise decided 7
-        rub = EffectSetting("coulomb_friction", {"torque": 2.0 + 0.02 * seed})
-        plant, polarity = Plant(rig.with_effects(rub), RATE, seed=seed), Polarity(rig, RATE, 26.0)
-        torque = 0.0
-        for _ in range(round(5.0 * RATE)):
-            torque = polarity.probe(measured(plant.step(torque), {}), 0.0)
-            if torque is None or polarity.contradiction:
-                break
+        bench = rig.with_effect("coulomb_friction", torque=2.0 + 0.02 * seed)
+        polarity, _ = probe(bench, {}, seconds=5.0, seed=seed, rig=rig, limit=26.0)
         decided.append(polarity.contradiction or polarity.proven)
     assert {*decided} <= {True, False} and sum(decided) >= 6  # the others are open: pulses go on
 
@@ -159,26 +155,29 @@ def test_a_sign_that_changes_under_torque_is_a_fault_within_two_samples(changed,
     """It was left to error_limit: half a second at the limit of the torque. Of 3 N m the watch took 25."""
     if amplitude < 20.0 and changed == "velocity":
         return  # the angle goes on as before, and the momentum is all there is
-    names, (told, most) = changed.split(" and "), TURNED[changed]
+    (told, most), factors = TURNED[changed], dict.fromkeys(changed.split(" and "), -1.0)
     size = min(amplitude, 4.7) if rig is FREE else amplitude
-    words, k = falsified_under_torque(rig, size, dict.fromkeys(names, -1.0))
+    words, sent = watched(rig, size, lambda k, read: falsified(read, factors if k > 292 else {}))
     assert (f"with {told} reversed" if changed == "velocity" else f"{told} has changed its sign") in words
-    assert 292 < k <= 292 + most
+    assert 292 < len(sent) <= 292 + most
 
 
-def falsified_under_torque(rig, amplitude, factors):
-    """Return the contradiction, and the number of its sample; at 292 factors begin to act."""
-    plant, polarity, torque = Plant(rig, RATE), Polarity(rig, RATE, LIMIT), 0.0
-    controller, polarity.proven = TorqueController(rig, RATE, GAINS), True
-    for k in range(1000):
-        reading = measured(plant.step(torque), factors if k > 292 else {})
-        if polarity.watch(reading):
-            break
-        if polarity.doubted:
-            reading = replace(reading, ft=math.nan)
-        torque = controller.step(reading, amplitude * math.sin(2.0 * math.pi * 4.0 * k / RATE))
+def watched(rig, amplitude, spoil, *, hold=False, count=1000):
+    """Return the contradiction under a sine or a constant torque, and the torques sent until then."""
+    polarity, controller = Polarity(rig, RATE, LIMIT), TorqueController(rig, RATE, GAINS)
+    polarity.proven = True
+
+    def answer(k, read):
+        read = spoil(k, read)
+        if polarity.watch(read):
+            return None
+        wish = amplitude if hold else wave(k, amplitude, 4.0)
+        torque = controller.step(replace(read, ft=math.nan) if polarity.doubted else read, wish)
         polarity.sent(torque)
-    return polarity.contradiction, k
+        return torque
+
+    _, sent = play(rig, count, answer)
+    return polarity.contradiction, sent
 
 
 @pytest.mark.parametrize("hold", [5.0, 10.0, 30.0])
@@ -194,25 +193,17 @@ def falsified_under_torque(rig, amplitude, factors):
 )
 def test_a_step_of_ft_that_no_spring_shows_is_followed_by_no_torque(lie, told, hold):
     """One such sample is a lost one, a second one a contradiction: the torque stays within 1.3 times."""
-    plant, polarity, torque, sent = Plant(RIG, RATE), Polarity(RIG, RATE, LIMIT), 0.0, []
-    controller, polarity.proven = TorqueController(RIG, RATE, GAINS), True
-    for k in range(800):
-        reading = measured(plant.step(torque), {})
-        reading = replace(reading, ft=lie(reading.ft, k - 700)) if k >= 700 else reading
-        if polarity.watch(reading):
-            break
-        torque = controller.step(replace(reading, ft=math.nan) if polarity.doubted else reading, hold)
-        polarity.sent(torque)
-        sent.append(torque if k >= 700 else 0.0)
-    assert (k == 701 and "ft jumped by" in polarity.contradiction) if told else k == 799
-    assert max(map(abs, sent)) < 1.3 * hold
+    spoil = lambda k, read: replace(read, ft=lie(read.ft, k - 400)) if k >= 400 else read  # noqa: E731
+    words, sent = watched(RIG, hold, spoil, hold=True, count=500)
+    assert (len(sent) == 401 and "ft jumped by" in words) if told else len(sent) == 500
+    assert np.abs(sent[400:]).max() < 1.3 * hold
 
 
 def test_an_ft_of_a_later_instant_is_no_jump():
     """Where records of ft are lost, a state gets the next one, up to 8 samples later."""
     plant, polarity, dice = Plant(RIG, RATE), Polarity(RIG, RATE, LIMIT), random.Random(1)
     torques = [20.0 * math.sin(2.0 * math.pi * 4.0 * k / RATE) for k in range(1400)]
-    readings = [measured(plant.step(torque), {}) for torque in torques]
+    readings = [reading(plant.step(torque)) for torque in torques]
     polarity.proven, ahead = True, 0
     for k in range(1380):
         ahead = max(ahead - 1, dice.randrange(9) if dice.random() < 0.05 else 0)
@@ -224,27 +215,21 @@ def test_an_ft_of_a_later_instant_is_no_jump():
 
 def test_a_gain_of_ft_that_changes_is_not_called_a_sign():
     """It was "joint_states has changed its sign"."""
-    words, k = falsified_under_torque(RIG, 20.0, {"ft": 0.5})
-    assert "ft jumped by" in words and "changed" not in words and k < 296
+    words, sent = watched(RIG, 20.0, lambda k, read: falsified(read, {"ft": 0.5} if k > 292 else {}))
+    assert "ft jumped by" in words and "changed" not in words and len(sent) < 296
 
 
 @pytest.mark.parametrize(("rig", "amplitude"), [(RIG, 10.0), (RIG, 3.0), (FREE, 3.0)])
 def test_states_that_stand_still_are_named_and_not_the_sensor_that_is_right(rig, amplitude):
     """With a free end 68 N m were commanded for 2 s and more, and clamped ft was blamed."""
-    plant, polarity, torque = Plant(rig, RATE), Polarity(rig, RATE, LIMIT), 0.0
-    controller = TorqueController(rig, RATE, GAINS)
-    polarity.proven = True
-    for k in range(600):
-        reading = measured(plant.step(torque), {})
-        if k < 285:
-            last = reading
-        else:
-            reading = replace(last, ft=reading.ft)
-        if polarity.watch(reading):
-            break
-        torque = controller.step(reading, amplitude * math.sin(8.0 * math.pi * k / RATE))
-        polarity.sent(torque)
-    assert "joint_states repeat one value" in polarity.contradiction and k < 285 + 20
+    last = []
+
+    def stand_still(k, read):
+        last[:] = [read] if k < 285 else last
+        return replace(last[0], ft=read.ft)
+
+    words, sent = watched(rig, amplitude, stand_still)
+    assert "joint_states repeat one value" in words and len(sent) < 285 + 20
 
 
 @pytest.mark.parametrize(
@@ -272,8 +257,8 @@ def test_a_blow_to_a_free_load_is_no_changed_sign():
     change, damping = SignChange(FREE, RATE, (0.03, 0.1), 4.0), FREE["rotor.reflected_damping"]
     for k in range(300):
         ft, speed = (2.0 if k < 290 else -2.0), 0.01
-        reading = Measurement(ft, speed, speed * k / RATE, ft + damping * speed)
-        assert change.take(reading, 0.0, 0, change.jump(reading, 0)) == ""
+        read = Measurement(ft, speed, speed * k / RATE, ft + damping * speed)
+        assert change.take(read, 0.0, 0, change.jump(read, 0)) == ""
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, 1e300, -1e300, 9e5])
@@ -283,10 +268,8 @@ def test_a_value_that_is_no_measurement_ends_no_controller(name, bad):
     plant, polarity = Plant(RIG, RATE), Polarity(RIG, RATE, LIMIT)
     for k in range(120):
         torque = 5.0 * math.sin(0.1 * k)
-        reading = measured(plant.step(torque), {})
-        if k in (60, 90, 91):
-            reading = replace(reading, **{name: bad})
-        polarity.watch(reading)
+        read = reading(plant.step(torque))
+        polarity.watch(replace(read, **{name: bad}) if k in (60, 90, 91) else read)
         polarity.sent(torque)
     if abs(bad) != 9e5:
         assert not polarity.contradiction

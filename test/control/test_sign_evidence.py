@@ -1,7 +1,5 @@
 """What readings say of signs and sizes equals regressions over the weighted past, and pulses by hand."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -56,15 +54,13 @@ def heard(evidence, ft, velocity, position, made, **options):
 def rows(ft, velocity, position, made, creep=2e-3):
     """Return the rows of the balance, weighted with half a second of memory, and the torques made."""
     speed, mean = 0.5 * (velocity[1:] + velocity[:-1]), 0.5 * (ft[1:] + ft[:-1])
-    x = np.column_stack(
-        [mean, J * np.diff(velocity) / H, B * speed, np.sign(speed), np.ones(N - 1)]
-    )
+    x = np.column_stack([mean, J * np.diff(velocity) / H, B * speed, np.sign(speed), np.ones(N - 1)])
     weight = np.sqrt((1.0 - H / 0.5) ** np.arange(N - 1)[::-1])
     keep = np.abs(speed) > creep
     return (x * weight[:, None])[keep], (made[1:] * weight)[keep], float(np.sum(weight[keep] ** 2))
 
 
-def test_misfits_of_signs_are_regressions_beside_the_rigs_values() -> None:
+def test_misfits_of_signs_are_regressions_beside_the_rigs_values():
     given = stream()
     evidence = SignEvidence(RIG, RATE, PULSE)
     answers = heard(evidence, *given)
@@ -87,7 +83,7 @@ def test_misfits_of_signs_are_regressions_beside_the_rigs_values() -> None:
     assert evidence.friction() == pytest.approx(friction) and friction == pytest.approx(0.5, abs=0.1)
 
 
-def test_noise_raises_floors_and_samples_left_out_are_not_fitted() -> None:
+def test_noise_raises_floors_and_samples_left_out_are_not_fitted():
     rig = noisy_rig()
     evidence = SignEvidence(rig, RATE, PULSE)
     assert evidence.ft_noise == pytest.approx(0.3)
@@ -107,7 +103,7 @@ def test_noise_raises_floors_and_samples_left_out_are_not_fitted() -> None:
     assert none.hear(Measurement(1.0, 1.0, 0.0, 3.5), 0.0, 2) is None and none.made == (2.5, 3.5)
 
 
-def test_the_unrest_is_the_rms_about_a_slow_mean() -> None:
+def test_the_unrest_is_the_rms_about_a_slow_mean():
     given = stream()
     evidence = SignEvidence(RIG, RATE, PULSE)
     heard(evidence, *given)
@@ -132,7 +128,7 @@ def test_the_unrest_is_the_rms_about_a_slow_mean() -> None:
         (0.2, False, "ft is 5 times the torque by motor torque and motion"),
     ],
 )
-def test_the_size_of_ft_is_its_factor_in_the_balance(factor, known, words) -> None:
+def test_the_size_of_ft_is_its_factor_in_the_balance(factor, known, words):
     given = stream(factor=factor, noise=0.02)
     evidence = SignEvidence(RIG, RATE, PULSE)
     heard(evidence, *given)
@@ -168,7 +164,7 @@ def pulse(evidence, torque, *, turn=5e-3, feels=None, rest=0.0, samples=50, sign
     ("torque", "feels", "is_felt"),
     [(6.0, 7.5, True), (6.0, -7.5, True), (-6.0, 7.5, True), (0.0, 0.006, True), (0.0, 0.003, False)],
 )
-def test_a_motor_and_a_load_at_rest_take_no_negative_power(torque, feels, is_felt) -> None:
+def test_a_motor_and_a_load_at_rest_take_no_negative_power(torque, feels, is_felt):
     """SIGNS by s_T, s_w: the motor's power has the sign of s_w, the load's that of both.
 
     Of the load's 50 parts of a turn of 0.1 mrad noise of 5 mN m says 3 * 3.5 uJ: 4.2 mN m in the end.
@@ -185,7 +181,7 @@ def test_a_motor_and_a_load_at_rest_take_no_negative_power(torque, feels, is_fel
     assert evidence.powers() == {signs: 0.5 * cost for signs, cost in expected.items()}
 
 
-def test_a_turn_that_hardly_stretches_the_spring_tells_nothing_of_the_motor() -> None:
+def test_a_turn_that_hardly_stretches_the_spring_tells_nothing_of_the_motor():
     for turn, is_told in ((0.99 * 0.1 * PULSE / K, False), (1.01 * 0.1 * PULSE / K, True)):
         evidence = SignEvidence(RIG, RATE, PULSE)
         pulse(evidence, -6.0, turn=turn, feels=0.0)
@@ -205,7 +201,7 @@ def test_a_turn_that_hardly_stretches_the_spring_tells_nothing_of_the_motor() ->
         (0.9 * 0.1 * PULSE / K, -1.0, ""),
     ],
 )
-def test_position_and_velocity_go_one_way(turn, sign_v, words) -> None:
+def test_position_and_velocity_go_one_way(turn, sign_v, words):
     evidence = SignEvidence(RIG, RATE, PULSE)
     assert evidence.turned() == ""
     pulse(evidence, 6.0, turn=turn, sign_v=sign_v)
@@ -225,7 +221,7 @@ def test_position_and_velocity_go_one_way(turn, sign_v, words) -> None:
         (1.5, 3.5, 0.75, ""),
     ],
 )  # fmt: skip
-def test_spring_and_ft_move_alike_between_clamped_ends(way, most, size, words) -> None:
+def test_spring_and_ft_move_alike_between_clamped_ends(way, most, size, words):
     evidence = SignEvidence(RIG, RATE, PULSE)
     pulse(evidence, 0.0)
     evidence._restless, evidence._strongest = 0.0, 4.0
@@ -234,7 +230,7 @@ def test_spring_and_ft_move_alike_between_clamped_ends(way, most, size, words) -
 
 
 @pytest.mark.parametrize(("felt", "told"), [(3.49, False), (3.52, True)])  # of 2.5 · 1.2 + 0.1 PULSE
-def test_spring_and_ft_move_no_more_than_the_motor_makes(felt, told) -> None:
+def test_spring_and_ft_move_no_more_than_the_motor_makes(felt, told):
     evidence = SignEvidence(RIG, RATE, PULSE)
     pulse(evidence, 0.0)
     evidence._restless, evidence._strongest = 0.0, 1.2

@@ -11,16 +11,11 @@ import pytest
 
 from rsea_ros.control.controller import ControllerSettings, Measurement, TorqueController
 from rsea_ros.control.grid import Grid
-from rsea_ros.control.law import Gains
 from rsea_ros.control.prediction import Acted, Prediction
 from rsea_ros.hardware.peer.peer_motor import EmulatedMotor
 from rsea_ros.hardware.simulated import SimulatedDevice
-from rsea_ros.model.rig_file import load_rig
+from test.control.benches import FAST, GAINS_AT, RATE, RIG
 
-GAINS = {
-    280.0: Gains(0.2575, 0.003029, 1.195, 6.99, 42.9),
-    1000.0: Gains(0.2446, 0.00087, 0.612, 29.97, 53.6),
-}
 HZ, AMPLITUDE, SETTLE = 5.0, 10.0, 0.6
 BEGIN, RECORD, WRITES, READS = 10**12, 1_000_000, 100_000, 300_000
 """ns: the first instant; a record of the sensor; after the start of its cycle."""
@@ -31,7 +26,7 @@ class Wire:
 
     def __init__(self):
         self.clock, self._due = BEGIN, BEGIN
-        self._plant = SimulatedDevice(load_rig("paper_high_impedance"), 10_000.0, clock=lambda: self.clock)
+        self._plant = SimulatedDevice(RIG, 10_000.0, clock=lambda: self.clock)
         self._plant.open()
         self._motor = EmulatedMotor(54024, self._plant)
         for name, value in (("mode", 0), ("torque_enable", 1)):
@@ -67,7 +62,7 @@ def errors(rate, shift, settings=None):
     shift: samples by which the grid of the desired torques lies behind the sensor's first record.
     """
     wire, grid, period = Wire(), Grid(1e9 / rate), 1e9 / rate
-    controller = TorqueController(load_rig("paper_high_impedance"), rate, GAINS[rate], settings=settings)
+    controller = TorqueController(RIG, rate, GAINS_AT[rate], settings=settings)
     start, command, rows = BEGIN + shift * period, 0.0, []
     for k in range(1, round(1.6 * rate)):
         wire.at(round(BEGIN + k * period + WRITES))
@@ -88,7 +83,7 @@ def errors(rate, shift, settings=None):
     return math.hypot(real, imaginary) / AMPLITUDE - 1.0, math.atan2(imaginary, real), off_rms
 
 
-@pytest.mark.parametrize(("rate", "shift"), [(280.0, 0.0), (280.0, 0.4), (1000.0, 0.0)])
+@pytest.mark.parametrize(("rate", "shift"), [(RATE, 0.0), (RATE, 0.4), (FAST, 0.0)])
 def test_a_sine_comes_out_in_size_and_in_time(rate, shift):
     """At 280 Hz it was 4.5 % too large: the current that is read after the write is the new command's, and
     was taken for that of the sample before. A desired torque between two samples came up to 3 degrees off.
@@ -100,26 +95,22 @@ def test_a_sine_comes_out_in_size_and_in_time(rate, shift):
 
 
 def test_an_outer_loop_that_learns_no_load_learns_the_timing_all_the_same():
-    gain, phase, _ = errors(280.0, 0.0, settings=ControllerSettings(learn=False))
+    gain, phase, _ = errors(RATE, 0.0, settings=ControllerSettings(learn=False))
     assert abs(gain) < 0.015 and abs(math.degrees(phase)) < 1.5
-
-
-def follow(part, n=600):
-    """Return the part that is learned of a motor whose measured torque has `part` of the new command."""
-    acted, commands = Acted(1.0 / 280.0), np.cumsum(np.random.default_rng(1).normal(size=n))
-    measured = (1.0 - part) * commands[:-1] + part * commands[1:]
-    for k in range(1, n - 1):
-        acted.over_sample(float(measured[k]), float(commands[k]), float(commands[k + 1]))
-    return acted.part
 
 
 @pytest.mark.parametrize("part", [0.0, 0.3, 1.0])
 def test_which_command_a_measured_torque_shows_is_learned(part):
-    assert follow(part) == pytest.approx(part, abs=0.01)
+    """part: of the new command in the measured torque."""
+    acted, commands = Acted(1.0 / RATE), np.cumsum(np.random.default_rng(1).normal(size=600))
+    measured = (1.0 - part) * commands[:-1] + part * commands[1:]
+    for k in range(1, 599):
+        acted.over_sample(float(measured[k]), float(commands[k]), float(commands[k + 1]))
+    assert acted.part == pytest.approx(part, abs=0.01)
 
 
 def test_without_a_measured_torque_or_a_change_nothing_is_learned():
-    acted = Acted(1.0 / 280.0)
+    acted = Acted(1.0 / RATE)
     assert math.isnan(acted.over_sample(math.nan, 0.0, 5.0))
     assert acted.over_sample(2.0, 2.0, 2.1) == 2.0
     assert acted.over_sample(9.0, 2.0, 9.0, sure=False) == 9.0
@@ -127,7 +118,7 @@ def test_without_a_measured_torque_or_a_change_nothing_is_learned():
 
 
 def test_the_torque_of_the_sample_before_is_the_measured_one_or_the_one_before_it():
-    acted = Acted(1.0 / 280.0)
+    acted = Acted(1.0 / RATE)
     for k in range(1000):
         torque = acted.over_sample(9.0 * (k % 2), 9.0 * ((k + 1) % 2), 9.0 * (k % 2))
     assert torque == pytest.approx(0.0, abs=1e-3)
@@ -136,8 +127,8 @@ def test_the_torque_of_the_sample_before_is_the_measured_one_or_the_one_before_i
 
 
 def test_a_desired_torque_between_samples_is_taken_where_it_is():
-    turns = 2.0 * math.pi * HZ / 280.0
+    turns = 2.0 * math.pi * HZ / RATE
     for off in (-0.4, 0.4):
-        prediction = Prediction(80.0, 1.0 / 280.0)
+        prediction = Prediction(80.0, 1.0 / RATE)
         ahead = [prediction.ahead(math.sin(turns * (k + off)), 3, off) for k in range(200)]
         assert ahead[-1][0] == pytest.approx(math.sin(turns * 201.0), abs=0.015)

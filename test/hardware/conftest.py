@@ -1,11 +1,8 @@
 """A simulated bench in a process of its own, and the driver's loop without ROS in this one."""
 
-from __future__ import annotations
-
 import math
 import time
-from contextlib import suppress
-from functools import partial
+from contextlib import contextmanager, suppress
 
 import pytest
 
@@ -115,16 +112,24 @@ def benches(tmp_path_factory):
 
 
 @pytest.fixture
-def device(benches):
-    """A function that makes the driver's device on the bench of 54024, which behaves well."""
-    well_behaved(benches())
-    return partial(device_on, benches())
+def device():
+    """A device that logs its calls."""
+    from test.hardware.logged_device import Device  # not where test_lost_torque runs a Loop without pytest
+
+    return Device()
 
 
 @pytest.fixture
-def loop(benches, request):
-    """An enabled loop that commands 10 N m, on the bench of the model that the test asks for."""
-    bench = benches(getattr(request, "param", 54024))
+def joint(device):
+    """It behind its limits, open and enabled."""
+    from test.hardware.logged_device import guard
+
+    return guard(device)
+
+
+@contextmanager
+def driven(bench):
+    """Yield an enabled loop on a bench that behaves well, which commands 10 N m."""
     well_behaved(bench)
     running = Loop(bench)
     running.guarded.enable()
@@ -133,6 +138,13 @@ def loop(benches, request):
     yield running
     well_behaved(bench)
     running.close()
+
+
+@pytest.fixture
+def loop(benches, request):
+    """Such a loop on the bench of the model that the test asks for."""
+    with driven(benches(getattr(request, "param", 54024))) as running:
+        yield running
 
 
 def well_behaved(bench):

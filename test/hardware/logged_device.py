@@ -1,7 +1,5 @@
 """A device that logs its calls, and the guarded device made of it."""
 
-from __future__ import annotations
-
 from rsea_ros.hardware.device import NoReply, State
 from rsea_ros.hardware.guarded import GuardedDevice
 from rsea_ros.hardware.limits import Limits

@@ -1,8 +1,11 @@
 """Faults of a motor on the wire: latched, torque zero in the cycle that sees it, over by its service."""
 
+from contextlib import ExitStack
+
 import pytest
 
 from rsea_ros.errors import DeviceError
+from test.hardware.conftest import driven
 from test.nodes.stalls import until
 
 WITHIN = 3
@@ -88,12 +91,23 @@ def _lost(loop):
     return errors.get("bus_lost", 0) + errors.get("bus_corrupt", 0)
 
 
-@pytest.mark.parametrize("loop", (54024, "AK10-9", "CyberGear", "mini-cheetah"), indirect=True)
-def test_a_driver_that_hangs_is_stopped_by_the_supervisor_and_knows_it(loop):
-    since = loop.bench.ask("set", temperature=32)["t"]
-    until(lambda: loop.bench.torque() == (0, False))
-    assert loop.until_fault(10.0) == 1
-    assert loop.guarded.fault.cause == "heldup"
-    loop.guarded.clear()
-    assert loop.acts(10.0)
-    assert torques(loop.bench, since)[-1][1]
+HELD_UP = {
+    **dict.fromkeys((54024, "AK10-9", "CyberGear", "mini-cheetah"), ("heldup", 1, "clear")),
+    "DM8009": ("hardware_error: communication lost", 2, "reboot"),
+    "RS03": ("motor_state: state is reset", 2, "clear"),
+}  # fmt: skip
+"""What a driver that hung hears of its supervisor or the drive's own watchdog, within how many cycles; the
+service that ends it."""
+
+
+def test_the_torque_of_a_driver_that_hangs_is_ended_and_it_knows_it(benches):
+    """All at once: each has been commanded, and is no more."""
+    with ExitStack() as begun:
+        loops = {model: begun.enter_context(driven(benches(model))) for model in HELD_UP}
+        until(lambda: all(loop.bench.torque() == (0, False) for loop in loops.values()))
+        for model, loop in loops.items():
+            cause, most, service = HELD_UP[model]
+            assert loop.until_fault(10.0) <= most and str(loop.guarded.fault).startswith(cause), model
+            since = loop.bench.ask("set", temperature=32)["t"]
+            getattr(loop.guarded, service)()
+            assert loop.acts(10.0) and torques(loop.bench, since)[-1][1]

@@ -1,13 +1,23 @@
-"""The codec of Protocol 2.0 against the maker's vectors, against the peer's own codec, and against damage."""
+"""Protocol 2.0 and its port: the maker's vectors, another codec, damage, bytes on a pseudo-terminal."""
 
 import itertools
+import os
 import random
+import select
+import time
+import tty
+from contextlib import suppress
 
 import pytest
 
-from rsea_ros.hardware.dynamixel.bus import PacketHandler
+from rsea_ros.hardware.device import NoReply, PortLost
+from rsea_ros.hardware.dynamixel.bus import Bus, PacketHandler
+from rsea_ros.hardware.dynamixel.control_tables import TABLES, MotorConnection, TorqueConstant
 from rsea_ros.hardware.dynamixel.frames import StatusFrameParser, frame, stuff, unstuff
+from rsea_ros.hardware.dynamixel.motor import Motor
+from rsea_ros.hardware.dynamixel.port import SerialPort, Turns
 from rsea_ros.hardware.peer import protocol2
+from rsea_ros.hardware.peer.protocol2 import status
 
 ALPHABET = (0xFF, 0xFD, 0x00, 0x55)
 VECTORS = {
@@ -102,3 +112,113 @@ def test_damaged_and_random_bytes_give_no_frame_that_was_not_sent():
         for damaged in mutations(rng, packet):
             assert StatusFrameParser().feed(damaged) in ([], [packet]), damaged.hex(" ")
             strings += 1
+
+
+@pytest.fixture
+def wire():
+    """An open port and the descriptor of its other end."""
+    near, far = os.openpty()
+    tty.setraw(far)
+    port = SerialPort(os.ttyname(far), 1_000_000, 1e-3)
+    port.open()
+    os.close(far)
+    yield port, near
+    port.close()
+    with suppress(OSError):  # the test may have closed it
+        os.close(near)
+
+
+def receive_all(port, size):
+    """Everything until so many bytes have come."""
+    data, deadline = b"", time.monotonic() + 10.0
+    while len(data) < size and time.monotonic() < deadline:
+        port.setPacketTimeoutMillis(100.0)
+        data += port.receive()
+    return data
+
+
+@pytest.mark.parametrize("size", [1, 64, 65, 4000])
+def test_a_reply_is_read_whole(wire, size):
+    port, near = wire
+    for fill in range(3):
+        reply = bytes((k + fill) % 251 for k in range(size))
+        os.write(near, reply)
+        assert receive_all(port, size) == reply
+
+
+def test_without_a_reply_nothing_is_returned_after_the_time_out(wire):
+    port, _ = wire
+    port.setPacketTimeoutMillis(2.0)
+    assert port.receive() == b"" and port.isPacketTimeout() and port.time_left == 0.0
+
+
+def test_bytes_that_came_before_are_discarded(wire):
+    port, near = wire
+    os.write(near, b"older")
+    assert select.select([port.descriptor], [], [], 10.0)[0], "they have come"
+    port.clearPort()
+    os.write(near, b"new")
+    assert receive_all(port, 3) == b"new"
+
+
+def test_a_port_that_hangs_up_is_lost(wire):
+    port, near = wire
+    os.close(near)
+    with pytest.raises(PortLost):
+        port.writePort(b"x")
+
+
+SIZE = TABLES[54024].sample[1]
+WRITTEN, READ = status(1, 0), status(1, 0, bytes(SIZE))
+
+
+class Line:
+    """A port that has the replies of each request ready, in order; a request without any times out."""
+
+    def __init__(self, *replies):
+        self.replies, self.waiting = [list(r) for r in replies], []
+        self.port_name, self.is_using, self.turns = "line", False, Turns()
+        self.latency = self.return_delay = self.time_left = 0.0
+        self.baudrate = 1_000_000
+
+    def clearPort(self):
+        self.waiting = []
+
+    def writePort(self, packet):
+        self.waiting = self.replies.pop(0)
+        return len(packet)
+
+    def receive(self):
+        return self.waiting.pop(0) if self.waiting else b""
+
+    def isPacketTimeout(self):
+        return not self.waiting
+
+    def setPacketTimeout(self, length):
+        """Take no time."""
+
+    setPacketTimeoutMillis = setPacketTimeout
+
+
+def motor_on(line):
+    """An open 54024 there."""
+    motor = Motor(MotorConnection("line"))
+    motor.port, motor.bus, motor.table = line, Bus(line, 1), TABLES[54024]
+    motor.torque_constant = TorqueConstant(6.8, 6.8, 6.8, "")
+    return motor
+
+
+@pytest.mark.parametrize(
+    ("during_write", "during_read", "late"),
+    [([], [WRITTEN, READ], True), ([], [READ], False), ([WRITTEN], [READ], False),
+     ([WRITTEN], [WRITTEN, READ], False)],
+)  # fmt: skip
+def test_a_reply_during_the_reading_is_a_late_acknowledgement(during_write, during_read, late):
+    motor = motor_on(Line(during_write, during_read, [WRITTEN], [READ]))
+    with suppress(NoReply):
+        motor.write(1.0)
+    begun = time.monotonic_ns()
+    assert motor.read().instant >= begun and motor.acknowledged_late is late
+    motor.write(1.0)
+    motor.read()
+    assert motor.acknowledged_late is False

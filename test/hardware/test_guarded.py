@@ -1,7 +1,5 @@
 """A device behind its limits: the calls of each cycle in their order, and the end of its failures."""
 
-from __future__ import annotations
-
 import math
 from contextlib import nullcontext
 
@@ -13,19 +11,9 @@ from rsea_ros.hardware.guarded import GuardedDevice
 from rsea_ros.hardware.interlock import DeviceFault
 from rsea_ros.hardware.limits import Limits, without
 from rsea_ros.hardware.protection import BUS_WATCHDOG, NONE, PROCESS
-from test.hardware.logged_device import LOST, Device, cycles, guard
+from test.hardware.logged_device import LOST, Device, cycles
 
 WRENCH = (0.0, 0.0, 0.0, 0.0, 0.0, 7.0)
-
-
-@pytest.fixture
-def device():
-    return Device()
-
-
-@pytest.fixture
-def joint(device):
-    return guard(device)
 
 
 def test_nothing_is_enabled_counted_or_read_before_it_is_asked_for(device):

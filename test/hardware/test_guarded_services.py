@@ -1,7 +1,5 @@
 """A device behind its limits: enable, disable, tare, clear a fault, reboot; one thread at a time uses it."""
 
-from __future__ import annotations
-
 from contextlib import ExitStack
 
 import pytest
@@ -11,17 +9,7 @@ from rsea_ros.hardware.device import NoReply
 from rsea_ros.hardware.guarded import GuardedDevice
 from rsea_ros.hardware.interlock import DeviceFault
 from rsea_ros.hardware.limits import Limits
-from test.hardware.logged_device import LOST, Device, cycles, guard
-
-
-@pytest.fixture
-def device():
-    return Device()
-
-
-@pytest.fixture
-def joint(device):
-    return guard(device)
+from test.hardware.logged_device import LOST, cycles
 
 
 def test_enabling_needs_no_fault_and_begins_softly(joint, device):

@@ -19,6 +19,7 @@ from rsea_ros.hardware.protection import SupervisorLost
 from test.hardware.conftest import Loop, well_behaved
 from test.nodes.stalls import until
 
+ROOT = Path(__file__).resolve().parents[2]
 SECOND = 280
 """Cycles."""
 
@@ -98,39 +99,40 @@ while True:
 """
 
 
-@pytest.mark.parametrize("model", (54024, "AK10-9", "CyberGear"))
-def test_a_supervisor_service_zeroes_the_torque_when_a_whole_process_group_is_killed(benches, service, model):
-    """Driver, its children and its session are killed at once, as by a service manager or a container."""
-    bench, root = benches(model), Path(__file__).resolve().parents[2]
-    well_behaved(bench)
-    words = [sys.executable, "-c", DRIVER, bench.port, bench.ft_port, bench.page_port, service, model]
-    driver = subprocess.Popen(list(map(str, words)), cwd=root, start_new_session=True)
+def command(bench, supervised, **options):
+    """Start a driver of a bench as the first process of a session; return it."""
+    words = ["-c", DRIVER, bench.port, bench.ft_port, bench.page_port, supervised, bench.model]
+    return subprocess.Popen([sys.executable, *map(str, words)], cwd=ROOT, start_new_session=True, **options)
+
+
+def kill(drivers, first=lambda: None):
+    """Wait until drivers make their torque; kill each with its children at once, and wait for its end."""
     try:
-        until(lambda: bench.torque()[0] != 0 and bench.torque()[1])
+        until(lambda: all(bench.torque()[0] != 0 and bench.torque()[1] for bench, _ in drivers))
     finally:
-        os.killpg(driver.pid, signal.SIGKILL)
-        driver.wait()
-    until(lambda: bench.torque() == (0, False))
+        first()
+        for _, driver in drivers:
+            os.killpg(driver.pid, signal.SIGKILL)
+            driver.wait()
+    until(lambda: all(bench.torque() == (0, False) for bench, _ in drivers))
+
+
+def test_a_supervisor_service_zeroes_the_torque_when_a_whole_process_group_is_killed(benches, service):
+    """Driver, its children and its session are killed at once, as by a service manager or a container."""
+    each = [benches(model) for model in (54024, "AK10-9", "CyberGear")]
+    for bench in each:
+        well_behaved(bench)
+    kill([(bench, command(bench, service)) for bench in each])
 
 
 def test_the_drivers_own_supervisor_outlives_a_login_that_is_killed(benches):
     """Its terminal hangs up, and everything started from it is killed."""
-    bench, root = benches(), Path(__file__).resolve().parents[2]
-    well_behaved(bench)
+    well_behaved(bench := benches())
     near, far = pty.openpty()
-    words = [sys.executable, "-c", DRIVER, bench.port, bench.ft_port, bench.page_port, "", 54024]
-    login = subprocess.Popen(
-        list(map(str, words)), cwd=root, start_new_session=True, stdin=far, stdout=far, stderr=far,
-        preexec_fn=lambda: fcntl.ioctl(0, termios.TIOCSCTTY, 0),
-    )  # fmt: skip
+    terminal = dict.fromkeys(("stdin", "stdout", "stderr"), far)
+    login = command(bench, "", preexec_fn=lambda: fcntl.ioctl(0, termios.TIOCSCTTY, 0), **terminal)
     os.close(far)
-    try:
-        until(lambda: bench.torque()[0] != 0 and bench.torque()[1])
-    finally:
-        os.close(near)
-        os.killpg(login.pid, signal.SIGKILL)
-        login.wait()
-    until(lambda: bench.torque() == (0, False))
+    kill([(bench, login)], first=lambda: os.close(near))
     until(lambda: _is_free(bench.port))  # the supervisor has it until it ends
 
 

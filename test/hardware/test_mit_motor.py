@@ -5,6 +5,7 @@ import math
 import sys
 import threading
 import time
+from contextlib import ExitStack
 from dataclasses import replace
 from itertools import count
 
@@ -46,7 +47,7 @@ class Virtual:
         self.bus = can.Bus(interface="virtual", channel=self.channel)
         self.plants = [Mass() for _ in models]
         self.drives = [EmulatedDrive(name, each) for name, each in zip(models, self.plants, strict=True)]
-        self.heard, self._end = [], threading.Event()
+        self.heard, self.motors, self._end = [], [], threading.Event()
         self._thread = threading.Thread(target=self._serve)
         self._thread.start()
 
@@ -70,10 +71,13 @@ class Virtual:
     def motor(self, model, **more):
         """Return the driver's end of a drive."""
         usual = {"interface": "virtual", "latency": 0.2}
-        return MitMotor(CanConnection(self.channel, model, **(usual | more)))
+        self.motors.append(MitMotor(CanConnection(self.channel, model, **(usual | more))))
+        return self.motors[-1]
 
     def close(self):
-        """End it."""
+        """End it, and the motors first."""
+        for motor in self.motors:
+            motor.close()
         self._end.set()
         self._thread.join()
         self.bus.shutdown()
@@ -81,16 +85,29 @@ class Virtual:
 
 @pytest.fixture
 def virtual():
-    """A function that makes a virtual bus with drives; its motors are closed at the end."""
-    made = []
+    """A function that makes a virtual bus with drives."""
+    with ExitStack() as end:
 
-    def make(*models):
-        made.append(Virtual(*models))
-        return made[-1]
+        def make(*models):
+            made = Virtual(*models)
+            end.callback(made.close)
+            return made
 
-    yield make
-    for each in made:
-        each.close()
+        yield make
+
+
+@pytest.fixture
+def opened(virtual):
+    """A function that makes a drive alone on its bus: bus, motor, open and enabled, and plant."""
+
+    def make(model):
+        bus = virtual(model)
+        motor = bus.motor(model)
+        motor.open()
+        motor.enable()
+        return bus, motor, bus.plants[0]
+
+    return make
 
 
 @pytest.mark.parametrize("model", ("DM8009", "RS03", "CyberGear", "AK10-9", "mini-cheetah"))
@@ -146,12 +163,9 @@ def test_a_drive_without_a_watchdog_on_a_bus_without_a_descriptor_is_refused(vir
     assert bus.plants[0].torque == 0.0
 
 
-def test_what_a_drive_keeps_from_before_is_zero_when_it_is_switched_on(virtual):
+def test_what_a_drive_keeps_from_before_is_zero_when_it_is_switched_on(opened):
     """The worst that a drive may do: to go on with its last command."""
-    bus = virtual("DM8009")
-    motor, plant = bus.motor("DM8009"), bus.plants[0]
-    motor.open()
-    motor.enable()
+    bus, motor, plant = opened("DM8009")
     motor.write(9.0)
     motor.read()
     bus.drives[0].put("torque_enable", 0)
@@ -160,25 +174,21 @@ def test_what_a_drive_keeps_from_before_is_zero_when_it_is_switched_on(virtual):
     motor.enable()
     assert motor.read().trouble == ""
     assert felt and max(map(abs, felt)) < 0.02
-    motor.close()
 
 
-def test_two_drives_of_one_id_are_refused_and_noticed(virtual):
+def test_two_drives_of_one_id_are_refused_and_noticed(virtual, opened):
     bus = virtual("AK10-9", "AK10-9")
     with pytest.raises(DeviceError, match="more answers than commands: two drives have this ID"):
         bus.motor("AK10-9").open()
-    bus = virtual("AK10-9")
-    motor = bus.motor("AK10-9")
-    motor.open()
-    motor.enable()
+    bus, motor, _ = opened("AK10-9")
     bus.drives.append(EmulatedDrive("AK10-9", Mass()))
-    for _ in range(6):
+
+    def noticed():
         motor.write(1.0)
-        sample = motor.read()
-        time.sleep(0.01)
-    assert "two drives" in sample.trouble and motor.health()["bus_twice"] >= 3
+        return "two drives" in motor.read().trouble and motor.health()["bus_twice"] >= 3
+
+    until(noticed)
     del bus.drives[0]
-    motor.close()
 
 
 def test_several_drives_share_a_bus_and_do_not_hear_each_other(virtual):
@@ -196,59 +206,42 @@ def test_several_drives_share_a_bus_and_do_not_hear_each_other(virtual):
     assert [s.position for s in samples] == pytest.approx([0.3, 0.4, 0.5], abs=1e-3)
     assert [s.trouble for s in samples] == [""] * 3
     assert [plant.torque for plant in bus.plants] == pytest.approx([1.0, 2.0, 3.0], abs=0.02)
-    for motor in motors:
-        motor.close()
 
 
 @pytest.mark.parametrize("model", ("AK10-9", "mini-cheetah", "RS03"))
-def test_the_angle_goes_on_where_its_counts_begin_anew(virtual, model):
+def test_the_angle_goes_on_where_its_counts_begin_anew(opened, model):
     """Both ways over the end, three times round."""
-    bus = virtual(model)
-    motor = bus.motor(model)
-    motor.open()
+    _, motor, plant = opened(model)
     first = motor.read().position
     walk = [0.9 * k for k in range(84)] + [75.0 - 0.9 * k for k in range(168)]
     for angle in walk:
-        bus.plants[0].position = angle
+        plant.position = angle
         assert motor.read().position - first == pytest.approx(angle, abs=2e-3)
-    motor.close()
 
 
 @pytest.mark.parametrize("angle", (12.4, -13.0))
-def test_the_end_of_an_angle_of_which_no_source_says_what_follows_is_a_fault(virtual, angle):
-    bus = virtual("DM8009")
-    motor = bus.motor("DM8009")
-    motor.open()
+def test_the_end_of_an_angle_of_which_no_source_says_what_follows_is_a_fault(opened, angle):
+    _, motor, plant = opened("DM8009")
     assert motor.read().trouble == ""
-    bus.plants[0].position = angle
+    plant.position = angle
     assert motor.read().trouble == "the angle is at the end of its range, ±12.5 rad"
-    motor.close()
 
 
-def test_a_controller_that_is_bus_off_is_a_lost_port(virtual):
-    bus = virtual("AK10-9")
-    motor = bus.motor("AK10-9")
-    motor.open()
-    motor.enable()
+def test_a_controller_that_is_bus_off_is_a_lost_port(opened):
+    bus, motor, plant = opened("AK10-9")
     bus.tell(0x08, bytes(8), error=True)  # a bus error alone is counted
-    time.sleep(0.02)
-    motor.read()
-    assert motor.health()["bus_error_frames"] == 1
+    until(lambda: motor.read() and motor.health()["bus_error_frames"] == 1)
     bus.tell(0x40, bytes(8), error=True)
-    time.sleep(0.02)
     with pytest.raises(PortLost, match="bus-off"):
-        motor.read()
+        until(lambda: motor.read() and False)
     motor.recover()
-    assert bus.plants[0].torque == 0.0 and not bus.drives[0].get("torque_enable")
-    motor.close()
+    assert plant.torque == 0.0 and not bus.drives[0].get("torque_enable")
 
 
 @pytest.mark.parametrize(("code", "kind"), [(errno.ENOBUFS, NoReply), (errno.ENETDOWN, PortLost)])
-def test_a_frame_that_does_not_go_out_is_a_lost_answer_or_a_lost_port(virtual, monkeypatch, code, kind):
+def test_a_frame_that_does_not_go_out_is_a_lost_answer_or_a_lost_port(opened, monkeypatch, code, kind):
     """Without another node nobody acknowledges, and the queue is full; a bus that is off has no net."""
-    bus = virtual("AK10-9")
-    motor = bus.motor("AK10-9")
-    motor.open()
+    _, motor, _ = opened("AK10-9")
 
     def send(self, message, timeout=None):
         raise can.CanOperationError("Failed to transmit", code)
@@ -257,7 +250,6 @@ def test_a_frame_that_does_not_go_out_is_a_lost_answer_or_a_lost_port(virtual, m
         broken.setattr(can.interfaces.virtual.VirtualBus, "send", send)
         with pytest.raises(kind):
             motor.write(0.0)
-        motor.close()
 
 
 def test_without_python_can_the_device_says_what_to_install(monkeypatch):
@@ -279,22 +271,6 @@ def test_the_frames_for_a_supervisor_on_socketcan_are_the_kernels():
     assert port.wire(Frame(7, bytes(range(8)))) == b"\x07\0\0\0\x08\0\0\0" + bytes(range(8))
     assert port.wire(Frame(0x0400FD07, bytes(8), True))[:8] == b"\x07\xfd\x00\x84\x08\0\0\0"
     assert port.wire(Frame(0x020007FD, b"", True), whole=False) == b"\xfd\x07\x00\x82\x08\0\0\0"
-
-
-@pytest.mark.parametrize(
-    ("loop", "cause", "service"),
-    [
-        ("DM8009", "hardware_error: communication lost", "reboot"),
-        ("RS03", "motor_state: state is reset", "clear"),
-    ],
-    indirect=["loop"],
-)
-def test_the_drives_own_watchdog_ends_the_torque_of_a_driver_that_hangs(loop, cause, service):
-    assert loop.bench.torque()[1]
-    until(lambda: loop.bench.torque() == (0, False))
-    assert loop.until_fault(10.0) <= 2 and str(loop.guarded.fault).startswith(cause)
-    getattr(loop.guarded, service)()
-    assert loop.cycles(3, 10.0) == [10.0] * 3 and loop.bench.torque()[1]
 
 
 @pytest.mark.parametrize("model", ("AK10-9", "mini-cheetah"))

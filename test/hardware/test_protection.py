@@ -1,16 +1,28 @@
-"""Protection against a dead host: of every device, asked when it is opened; devices from outside."""
+"""Protection against a dead host: asked of every device at opening; supervisors and their services."""
 
+import configparser
+import json
 import math
+import os
+import signal
+import socket
+import subprocess
+import sys
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
+import yaml
 
 from rsea_ros.errors import DeviceError, ParameterError
+from rsea_ros.hardware import supervisor
 from rsea_ros.hardware.device import Spring
 from rsea_ros.hardware.guarded import GuardedDevice
 from rsea_ros.hardware.limits import Limits
 from rsea_ros.hardware.outside import options_of, outside_device
 from rsea_ros.hardware.protection import NONE
+from rsea_ros.nodes.driver import TABLE
+from test.nodes.stalls import until
 
 TOY = Path(__file__).with_name("toy_device.py")
 
@@ -36,6 +48,17 @@ def guard(device, spring=None, **limits):
     return GuardedDevice(device, Limits(68.0, **limits), 280.0, spring)
 
 
+def driven(toy, spring=None, limits=(), **options):
+    """Return a toy and its loop, enabled, after three cycles of 10 N m."""
+    device = toy(**options)
+    loop = guard(device, spring, **dict(limits))
+    loop.open(unprotected=True)
+    loop.enable()
+    for _ in range(3):
+        loop.cycle(10.0, 0.0)
+    return device, loop
+
+
 def test_a_device_without_protection_is_refused_unless_that_is_allowed(toy):
     device = toy()
     with pytest.raises(ParameterError, match="allow_no_dead_host_protection = true"):
@@ -47,13 +70,8 @@ def test_a_device_without_protection_is_refused_unless_that_is_allowed(toy):
 
 def test_a_supervised_toy_is_stopped_when_the_driver_hangs(toy):
     """It held its torque after a kill -9: the supervisor was private to the Dynamixel code."""
-    device = toy(supervised="yes")
-    loop = guard(device)
-    loop.open()
+    device, loop = driven(toy, supervised="yes")
     assert str(device.protection) == "supervisor, 0.1 s"
-    loop.enable()
-    for _ in range(5):
-        loop.cycle(10.0, 0.0)
     device.far.settimeout(10.0)
     assert device.far.recv(5) == b"stop\n"  # nobody has beaten for a while
     loop.cycle(10.0, 0.0)
@@ -64,12 +82,7 @@ def test_a_supervised_toy_is_stopped_when_the_driver_hangs(toy):
 
 def test_a_long_reboot_under_torque_is_not_taken_for_a_hang(toy):
     """Only the motor told the supervisor that its torque was off: one that was being set up was stopped."""
-    device = toy(supervised="yes", boot="0.3")
-    loop = guard(device)
-    loop.open()
-    loop.enable()
-    for _ in range(3):
-        loop.cycle(10.0, 0.0)
+    device, loop = driven(toy, supervised="yes", watchdog=0.2, boot="0.5")
     loop.reboot()
     loop.cycle(10.0, 0.0)
     device.far.setblocking(False)
@@ -79,13 +92,10 @@ def test_a_long_reboot_under_torque_is_not_taken_for_a_hang(toy):
 
 
 def test_the_springs_deflection_is_a_wrench_where_no_sensor_measures_one(toy):
-    device = toy()
-    loop = guard(device, Spring(1500.0, place=5, sign=-1.0), deflection=0.05, ft=60.0)
-    loop.open(unprotected=True)
-    loop.enable()
-    states = [loop.cycle(10.0, 0.0) for _ in range(3)]
-    assert states[-1].wrench == pytest.approx((0, 0, 0, 0, 0, -1500.0 * 0.01))
-    assert states[-1].inferred and states[-1].ft_stamp == states[-1].stamp
+    _, loop = driven(toy, Spring(1500.0, place=5, sign=-1.0), {"deflection": 0.05, "ft": 60.0})
+    state = loop.cycle(10.0, 0.0)
+    assert state.wrench == pytest.approx((0, 0, 0, 0, 0, -1500.0 * 0.01))
+    assert state.inferred and state.ft_stamp == state.stamp
     assert loop.ft_source == "stiffness of 1500 N·m/rad times measured deflection"
     assert loop.fault is None, "the drive stands at 3 rad: what counts is the spring's deflection"
     loop.cycle(66.0, 0.0)
@@ -94,11 +104,7 @@ def test_the_springs_deflection_is_a_wrench_where_no_sensor_measures_one(toy):
 
 def test_a_deflection_that_is_not_measured_stays_a_fault_until_it_is_again(toy):
     """The second reading without it was none: clear_fault was granted, and no limit held the spring."""
-    device = toy()
-    loop = guard(device, Spring(1500.0), deflection=math.inf, ft=60.0)
-    loop.open(unprotected=True)
-    loop.enable()
-    loop.cycle(0.0, None)
+    device, loop = driven(toy, Spring(1500.0), {"deflection": math.inf, "ft": 60.0})
     device.deflection_known = False
     for _ in range(3):
         loop.cycle(10.0, 0.0)
@@ -133,3 +139,123 @@ def test_options_are_texts_by_name():
     assert options_of("a=1, b = x y") == {"a": "1", "b": "x y"} and options_of("") == {}
     with pytest.raises(ParameterError, match="expected NAME=VALUE"):
         options_of("a")
+
+
+def may_hurry():
+    """Return whether a process of this user may run at real-time priority."""
+    code = "import os; os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(99))"
+    return subprocess.run([sys.executable, "-c", code], capture_output=True, check=False).returncode == 0
+
+
+def begin(*words):
+    """Start one; return the process, and the driver's end of its stdin."""
+    near, far = socket.socketpair()
+    with far:
+        words = [sys.executable, "-I", "-S", supervisor.__file__, *words]
+        return subprocess.Popen(words, stdin=far), near
+
+
+@pytest.mark.parametrize("listens", [False, True])
+def test_it_runs_before_all_other_processes_where_it_may(listens, tmp_path):
+    process, driver = begin(*(["--listen", str(tmp_path / "socket")] if listens else []))
+    wanted = os.SCHED_FIFO if may_hurry() else os.SCHED_OTHER
+    until(lambda: os.sched_getscheduler(process.pid) == wanted)
+    assert process.poll() is None
+    process.kill()
+    process.wait()
+    driver.close()
+
+
+FRAMES, REPLY = (b"zero", b"off!"), b"done"
+
+
+@pytest.mark.parametrize("ignored", [0, 50])
+def test_it_repeats_its_frames_until_the_motor_has_acknowledged_them(ignored):
+    """It sent them 20 times, whatever the motor answered, and nobody knew whether one had arrived."""
+    motor, port = socket.socketpair()
+    process, driver = begin()
+    order = {"timeout": 0.1, "frames": [frame.hex() for frame in FRAMES], "replies": [REPLY.hex()]}
+    socket.send_fds(driver, [json.dumps(order).encode()], [port.fileno()])
+    assert driver.recv(6) == b"ready\n"
+    driver.send(b"a")
+    assert driver.recv(1) == b"e", "it echoes"
+    driver.close()  # it is dead
+    port.close()
+    heard = []
+    while frame := motor.recv(4):
+        heard.append(frame)
+        if len(heard) > ignored:
+            with suppress(BrokenPipeError):  # it has read an earlier reply and ended
+                motor.send(b"noise" + REPLY)
+    assert process.wait(10.0) == 0
+    motor.close()
+    assert set(heard) == set(FRAMES) and len(heard) > ignored, "and then it has ended, without a signal"
+
+
+@pytest.fixture
+def calls(monkeypatch):
+    """Return what was called: urgency, ignored signals, and whom it served."""
+    made = []
+    monkeypatch.setattr(supervisor, "hurry", lambda: made.append("hurry"))
+    monkeypatch.setattr(supervisor.signal, "signal", lambda number, how: made.append((number, how)))
+    monkeypatch.setattr(supervisor, "listen", lambda path: made.append(("listen", path)))
+    monkeypatch.setattr(supervisor, "serve", lambda connection: made.append(("serve", connection)))
+    monkeypatch.setattr(supervisor.socket, "socket", lambda **options: options)
+    return made
+
+
+def test_a_service_listens_at_its_path_and_outlives_the_terminal(calls, monkeypatch):
+    monkeypatch.setattr(sys, "argv", ["supervisor", "--listen", "/run/rsea", "more"])
+    supervisor.main()
+    assert calls == ["hurry", (signal.SIGHUP, signal.SIG_IGN), ("listen", "/run/rsea")]
+
+
+def test_one_driver_is_served_whatever_the_terminal_says(calls, monkeypatch):
+    monkeypatch.setattr(sys, "argv", ["supervisor"])
+    supervisor.main()
+    deaf = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
+    assert calls == ["hurry", *((number, signal.SIG_IGN) for number in deaf), ("serve", {"fileno": 0})]
+
+
+ROOT = Path(__file__).resolve().parents[2]
+SERVICES = ROOT / "launch" / "services"
+SOCKET = "/run/rsea/supervisor"
+
+
+def units():
+    """Return the command of each service as words: of the unit files, then of the containers."""
+    commands = {}
+    for path in sorted(SERVICES.glob("*.service")):
+        parser = configparser.ConfigParser(interpolation=None)
+        parser.read(path)
+        commands[path.name] = parser["Service"]["ExecStart"].split()
+    for name, service in compose()["services"].items():
+        commands[f"compose {name}"] = service["command"]
+    return commands
+
+
+def compose():
+    """Return the containers."""
+    return yaml.safe_load((SERVICES / "compose.yaml").read_text())
+
+
+@pytest.mark.parametrize("name", units())
+def test_a_service_runs_a_file_of_the_repository_at_one_socket(name):
+    words = units()[name]
+    files = [word.replace("/opt/rsea/", "") for word in words if word.endswith(".py")]
+    modules = [f"{words[words.index('-m') + 1].replace('.', '/')}.py"] if "-m" in words else []
+    assert files + modules and all((ROOT / file).is_file() for file in files + modules)
+    assert any(SOCKET in word for word in words)
+
+
+@pytest.mark.parametrize("name", [name for name in units() if "driver" in name])
+def test_a_driver_gets_parameters_that_it_has(name):
+    given = {word.partition(":=")[0] for word in units()[name] if ":=" in word}
+    assert {"device", "supervisor"} <= given <= {parameter.name for parameter in TABLE}
+
+
+def test_the_containers_share_nothing_but_the_socket_and_end_in_turn():
+    supervisor, driver = (compose()["services"][name] for name in ("supervisor", "driver"))
+    assert supervisor["volumes"] == driver["volumes"] == ["rsea:/run/rsea"]
+    assert driver["depends_on"] == ["supervisor"] and supervisor["restart"] == "always"
+    assert "devices" not in supervisor, "the port comes over the socket"

@@ -1,4 +1,4 @@
-"""Dynamixel X and P beside Pro: their tables against the maker's numbers, and all of them on the wire."""
+"""Dynamixel X, P and Pro: tables against the maker's numbers, all on the wire, and wrong settings."""
 
 import math
 from contextlib import closing, suppress
@@ -7,8 +7,9 @@ from statistics import fmean
 import pytest
 
 from rsea_ros.errors import RseaError
-from rsea_ros.hardware.device import State
+from rsea_ros.hardware.device import PortLost, State
 from rsea_ros.hardware.dynamixel.control_tables import TABLES
+from rsea_ros.hardware.dynamixel.port import SerialPort
 from rsea_ros.hardware.limits import Limits
 from rsea_ros.hardware.peer.peer_motor import ACCESS, LIMIT, RANGE, EmulatedMotor
 from rsea_ros.hardware.peer.registers import MODELS
@@ -168,25 +169,28 @@ def test_each_series_makes_the_torque_and_says_what_it_is(benches, model):
     assert bench.torque() == (0, False)
 
 
-@pytest.mark.parametrize(
-    ("values", "told"),
-    [
-        ({"drive_mode": 8}, "drive_mode 8: a goal that is written switches its torque on, expected 0"),
-        ({"startup": 1}, "startup 1: its torque is on when the power comes, expected 0"),
-        ({"temperature_limit": 60}, "temperature_limit = 70 °C, expected at most 60 °C"),
-        ({"max_voltage": 85}, "voltage_limit = 9 V, expected less than 8.5 V"),
-        ({"torque_limit": 300}, "torque_limit = 2 N·m, expected at most 1.439 N·m, the motor's own limit"),
-    ],
-)
-def test_the_settings_of_the_motor_are_compared_with_the_drivers_limits(benches, values, told):
-    bench = benches(1020)
-    usual = {"drive_mode": 0, "startup": 0, "temperature_limit": 80, "max_voltage": 160, "torque_limit": 1193}
-    bench.ask("set", **values)
+UNFIT = {
+    "drive_mode 8: a goal that is written switches its torque on, expected 0": (1020, {"drive_mode": 8}, 0),
+    "startup 1: its torque is on when the power comes, expected 0": (1020, {"startup": 1}, 0),
+    "temperature_limit = 70 °C, expected at most 60 °C": (1020, {"temperature_limit": 60}, 80),
+    "voltage_limit = 9 V, expected less than 8.5 V": (1020, {"max_voltage": 85}, 160),
+    "torque_limit = 2 N·m, expected at most 1.439 N·m, the motor's own": (1020, {"torque_limit": 300}, 1193),
+    "torque_constant = 0, expected N·m/A: no source gives": (2120, {"number": 2100}, 2120),
+    "model 1060, expected one of .*1020.*54024": (54024, {"number": 1060}, 54024),
+}
+"""What is said of a motor, its model, one of its values, and what that is otherwise."""
+
+
+@pytest.mark.parametrize("told", UNFIT)
+def test_what_a_motor_is_and_keeps_must_fit_the_drivers_limits(benches, told):
+    model, wrong, usual = UNFIT[told]
+    bench, what = benches(model), "model" if "number" in wrong else "set"
+    bench.ask(what, **wrong)
     try:
         with pytest.raises(RseaError, match=told):
             device_on(bench, SMALL).open()
     finally:
-        bench.ask("set", **{name: usual[name] for name in values})
+        bench.ask(what, **dict.fromkeys(wrong, usual))
     assert bench.torque() == (0, False)
 
 
@@ -220,11 +224,33 @@ def test_angles_count_from_configure_or_from_the_motors_zero_with_its_homing_off
     assert float(offset) == pytest.approx(-math.pi / 2.0, rel=1e-4)
 
 
-def test_a_motor_without_a_known_constant_needs_one(benches):
-    bench = benches(2120)
-    bench.ask("model", number=2100)
-    try:
-        with pytest.raises(RseaError, match="torque_constant = 0, expected N·m/A: no source gives"):
-            device_on(bench, SMALL).open()
-    finally:
-        bench.ask("model", number=2120)
+WRONG = {
+    "another model": ({"model": 54025}, Limits(68.0), "model 54024, expected 54025"),
+    "another ID": ({"identity": 7}, Limits(68.0), "motor ID 7 on .*: no reply to ping"),
+    "more than the motor's limit": ({}, Limits(100.0), "100 N·m, expected at most 68.19 N·m"),
+    "more than the spring bears": ({}, Limits(68.0, deflection=0.02), "the rig's spring of 1530 N·m/rad"),
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_settings_that_do_not_fit_the_machine_are_refused(benches, name):
+    motor, limits, message = WRONG[name]
+    with pytest.raises(RseaError, match=message):
+        device_on(benches(), limits, **motor).open()
+    assert benches().torque() == (0, False)
+
+
+def test_a_port_that_does_not_exist_is_named(tmp_path):
+    port = SerialPort(str(tmp_path / "nothing"), 4_000_000, 1e-3)
+    with pytest.raises(PortLost, match=r"port .*nothing: .*expected a serial port that is free"):
+        port.open()
+
+
+def test_a_sensor_without_a_stream_is_refused_and_the_motor_left_off(benches, monkeypatch):
+    monkeypatch.setattr("rsea_ros.hardware.netft.sensor.FIRST", 0.3)
+    bench = benches()
+    bench.ask("misbehave", ft_silent=True)
+    with pytest.raises(RseaError, match=r"no record within 0\.3 s, expected a stream"):
+        device_on(bench).open()
+    bench.ask("misbehave", ft_silent=False)
+    assert bench.torque() == (0, False)

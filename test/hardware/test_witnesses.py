@@ -8,7 +8,8 @@ from functools import partial
 import numpy as np
 import pytest
 
-from rsea_ros.control.controller import Measurement, TorqueController
+from rsea_ros.control.controller import TorqueController
+from rsea_ros.control.following import reading
 from rsea_ros.control.law import Gains
 from rsea_ros.hardware.device import Spring, State
 from rsea_ros.hardware.guarded import GuardedDevice
@@ -31,13 +32,13 @@ WAVES = {
 }
 
 
-def bench(rig, plant=None):
+def bench(rig, plant=None, rate=RATE):
     """The driver's device on a simulated plant, a clock for it, and the device."""
-    values = {p.name: p.default for p in driver.TABLE} | {"rig": rig, "soft_start": 1e5}
+    values = {p.name: p.default for p in driver.TABLE} | {"rig": rig, "rate": rate, "soft_start": 1e5}
     now = [1_700_000_000 * SECOND]
-    device = SimulatedDevice(plant or load_rig(rig), RATE, clock=lambda: now[0])
+    device = SimulatedDevice(plant or load_rig(rig), rate, clock=lambda: now[0])
     guarded = GuardedDevice(
-        device, limits_of(values), RATE, spring_of(values), testify=partial(witnesses_of, values)
+        device, limits_of(values), rate, spring_of(values), testify=partial(witnesses_of, values)
     )
     guarded.open()
     guarded.enable()
@@ -94,46 +95,40 @@ def test_what_spring_and_motor_contradict_gravely_is_a_fault_as_soon_as_it_is_ce
     assert guarded.cycle(10.0, 0.0) is not None and guarded.guard.torque == 0.0
 
 
+def controlled(wave, seconds, falsified):
+    """Yield time, true ft, fault and contradiction by the limits; falsified: ft as it is read from 2 s on."""
+    values = {p.name: p.default for p in _control.TABLE}
+    limits = _control.ControllerLimits(_control.with_limits(values))
+    controller = TorqueController(load_rig(RIG), RATE, Gains(0.2575, 0.003029, 1.195, 6.99, 42.9))
+    plant, torque = Plant(load_rig(RIG), RATE), 0.0
+    for k in range(round(seconds * RATE)):
+        sample, time = plant.step(torque), k / RATE
+        read = replace(reading(sample), ft=falsified(sample.ft) if time > 2.0 else sample.ft)
+        fault = limits.falsified(round(k * SECOND / RATE), read, torque)
+        if time < 0.7:
+            controller.start(read)
+            continue
+        torque = controller.step(read, 10.0 * WAVES[wave](time - 0.7, None))
+        yield time, sample.ft, fault, limits.contradiction
+
+
 @pytest.mark.parametrize("wave", ["hold", "sine", "step"])
 @pytest.mark.parametrize("gain", [0.5, 1.0])
 def test_a_controller_does_not_follow_an_ft_that_reads_half_to_twice_the_torque(gain, wave):
     """It did, without a fault, whatever the driver was."""
-    values = {p.name: p.default for p in _control.TABLE}
-    limits = _control.ControllerLimits(_control.with_limits(values))
-    controller = TorqueController(load_rig(RIG), RATE, Gains(0.2575, 0.003029, 1.195, 6.99, 42.9))
-    plant, torque, made, fault = Plant(load_rig(RIG), RATE), 0.0, 0.0, ""
-    for k in range(round(3.0 * RATE)):
-        sample, time = plant.step(torque), k / RATE
-        reading = Measurement(sample.ft, sample.velocity, sample.position, sample.motor_torque)
-        reading = replace(reading, ft=(gain if time > 2.0 else 1.0) * reading.ft)
-        fault = limits.falsified(round(k * SECOND / RATE), reading, torque)
-        if time < 0.7:
-            controller.start(reading)
-            continue
+    made = []
+    for _, ft, fault, _ in controlled(wave, 3.0, lambda ft: gain * ft):
+        made.append(abs(ft))
         if fault:
             break
-        torque = controller.step(reading, 10.0 * WAVES[wave](time - 0.7, None))
-        made = max(made, abs(sample.ft))
-    assert bool(fault) == (gain == 0.5) and made < 16.0
+    assert bool(fault) == (gain == 0.5) and max(made) < 16.0
 
 
 def test_a_controller_that_follows_an_ft_with_another_zero_says_so():
     """Its feedback makes half as much torque again of it; beside a sound driver it was "running"."""
-    values = {p.name: p.default for p in _control.TABLE}
-    limits = _control.ControllerLimits(_control.with_limits(values))
-    controller = TorqueController(load_rig(RIG), RATE, Gains(0.2575, 0.003029, 1.195, 6.99, 42.9))
-    plant, torque, told = Plant(load_rig(RIG), RATE), 0.0, {}
-    for k in range(round(6.0 * RATE)):
-        sample, time = plant.step(torque), k / RATE
-        reading = Measurement(sample.ft, sample.velocity, sample.position, sample.motor_torque)
-        reading = replace(reading, ft=reading.ft - (5.8 if time > 2.0 else 0.0))
-        assert not limits.falsified(round(k * SECOND / RATE), reading, torque)
-        if time < 0.7:
-            controller.start(reading)
-            continue
-        torque, told[time] = controller.step(reading, 10.0), limits.contradiction
-    assert not any(words for time, words in told.items() if time < 2.0)
-    assert all("K times deflection" in words for time, words in told.items() if time > 5.5)
+    for time, _, fault, words in controlled("hold", 6.0, lambda ft: ft - 5.8):
+        assert not fault and not (words and time < 2.0)
+        assert time < 5.5 or "K times deflection" in words
 
 
 @pytest.mark.parametrize("delay", [0.0, 0.04])
@@ -205,14 +200,7 @@ def test_a_rest_does_not_make_a_falsified_zero_the_true_one(monkeypatch):
 
 def test_a_slow_rate_does_not_let_the_low_pass_run_away():
     """Below 17 Hz a sound machine had 1e15 N m, and a fault."""
-    values = {p.name: p.default for p in driver.TABLE} | {"rig": RIG, "rate": 12.0, "soft_start": 1e5}
-    now = [1_700_000_000 * SECOND]
-    device = SimulatedDevice(load_rig(RIG), 12.0, clock=lambda: now[0])
-    guarded = GuardedDevice(
-        device, limits_of(values), 12.0, spring_of(values), testify=partial(witnesses_of, values)
-    )
-    guarded.open()
-    guarded.enable()
+    guarded, now, _ = bench(RIG, rate=12.0)
     for _ in range(600):
         now[0] += round(SECOND / 12.0)
         guarded.cycle(8.0, 0.0)

@@ -1,5 +1,6 @@
 """The whole watch on a bench that shares no code with the model: changes are named and sized."""
 
+from copy import deepcopy
 from dataclasses import replace
 
 import numpy as np
@@ -14,7 +15,6 @@ from rsea_ros.model.observer import noise_of
 from rsea_ros.model.observer.log import events_of
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.records.record import Channel, Record
 
 RATE, CLEAN, AFTER = 280.0, 14.0, 8.0
 BENCH = Bench().with_values(coulomb=3.0, b_m=8.0)
@@ -38,23 +38,40 @@ def command(seconds, seed):
     return np.sum(waves, axis=0) * np.clip(t / 0.5, 0.0, 1.0)
 
 
-def watch_records(**fault):
-    """Monitor and its findings after a clean record and one with a fault."""
-    monitor, rng = Monitor(rig(), noise_of(rig()), SETTINGS), np.random.default_rng(1)
-    for bench, start, length in ((BENCH, 0.0, CLEAN), (BENCH.with_values(**fault), CLEAN, AFTER)):
-        run = record_command(bench, command(length, 2), rng)
-        record = Record({n: Channel(c.t + start, c.y) for n, c in run.channels.items()})
-        t, kind, values = events_of(record)
-        for k in range(0, len(t), 210):
-            monitor.take(t[k : k + 210], kind[k : k + 210], values[k : k + 210])
-            if monitor.job is not None:
-                monitor.conclude(monitor.job())
-    return monitor, monitor.findings()
+def play(monitor, bench, seconds, rng, *, start=0.0, noted=lambda: None):
+    """Let a monitor watch a bench and conclude its jobs; noted: called after each fifth of a second or so."""
+    t, kind, values = events_of(record_command(bench, command(seconds, 2), rng))
+    for k in range(0, len(t), 210):
+        monitor.take(t[k : k + 210] + start, kind[k : k + 210], values[k : k + 210])
+        noted()
+        if monitor.job is not None:
+            monitor.conclude(monitor.job())
 
 
-def test_a_healthy_joint_is_not_alarmed_and_its_parameters_are_right():
-    monitor, events = watch_records()
-    assert events == [] and not monitor.learning
+@pytest.fixture(scope="module")
+def clean():
+    """A monitor after a clean record, its noise, and what it had learned when the learning was over."""
+    monitor, rng, learned = Monitor(rig(), noise_of(rig()), SETTINGS), np.random.default_rng(1), []
+
+    def note():
+        if not monitor.learning and not learned:
+            learned.append(deepcopy(monitor.changes))
+
+    play(monitor, BENCH, CLEAN, rng, noted=note)
+    return monitor, rng, learned[0]
+
+
+def watched_on(clean, **fault):
+    """Return a copy of that monitor after eight more seconds with a fault."""
+    monitor, rng, _ = clean
+    monitor = deepcopy(monitor, {id(monitor._learning): None})  # it has ended, and no copy is made of it
+    play(monitor, BENCH.with_values(**fault), AFTER, deepcopy(rng), start=CLEAN)
+    return monitor
+
+
+def test_a_healthy_joint_is_not_alarmed_and_its_parameters_are_right(clean):
+    monitor = watched_on(clean)
+    assert monitor.findings() == [] and not monitor.learning
     values = {e.name: e for e in monitor.estimates()}
     low, high = values["spring.stiffness"].ci95
     assert low < BENCH.plant.k_s < high and high - low < 0.03 * BENCH.plant.k_s
@@ -76,51 +93,42 @@ def test_a_joint_in_a_position_loop_is_refused():
         ({"gap": 4e-3}, "RSEA_BACKLASH", 4e-3, 0.2e-3),
     ],
 )
-def test_a_change_is_named_and_sized(fault, code, size, tolerance):
-    _, (finding,) = watch_records(**fault)
+def test_a_change_is_named_and_sized(clean, fault, code, size, tolerance):
+    (finding,) = watched_on(clean, **fault).findings()
     assert finding.code == code and finding.confidence > 0.95
     assert finding.size == pytest.approx(size, abs=tolerance)
     assert finding.ci95[0] < finding.size < finding.ci95[1]
     assert CLEAN - 1.0 < finding.since < CLEAN + 3.0
 
 
-def watched_from_start(seconds, settings, every=70):
-    """A monitor that learned from a clean record, and how many looks it examined after which time (s)."""
-    monitor, examined = Monitor(rig(), noise_of(rig()), settings), []
-    events = events_of(record_command(BENCH, command(seconds, 2), np.random.default_rng(1)))
-    evidence = Bank.evidence
+def test_learning_examines_no_look_before_the_last_one_is_a_while_ago(monkeypatch):
+    pace, examined, evidence = 1.0, [], Bank.evidence
+    monitor = Monitor(rig(), noise_of(rig()), WatchSettings(learn=6, every=pace))
 
     def noted(bank, look):
         examined.append(monitor.now)
         return evidence(bank, look)
 
-    with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(Bank, "evidence", noted)
-        for k in range(0, len(events[0]), every):
-            if monitor.learning:
-                monitor.take(*(part[k : k + every] for part in events))
-    return monitor, examined
-
-
-def test_learning_examines_no_look_before_the_last_one_is_a_while_ago():
-    pace = 1.0
-    settings = WatchSettings(learn=6, every=pace)
-    monitor, examined = watched_from_start(30.0, settings)
+    monkeypatch.setattr(Bank, "evidence", noted)
+    events = events_of(record_command(BENCH, command(30.0, 2), np.random.default_rng(1)))
+    for k in range(0, len(events[0]), 70):
+        if monitor.learning:
+            monitor.take(*(part[k : k + 70] for part in events))
     assert not monitor.learning and len(examined) == 3 * 6 and min(np.diff(examined)) >= pace
 
 
-def test_learning_over_a_while_is_learning_at_one_go():
+def test_learning_over_a_while_is_learning_at_one_go(clean):
     """No look counts but the first ones, and the values are those of the bench."""
     t, kind, values = events_of(record_command(BENCH, command(CLEAN, 2), np.random.default_rng(1)))
     first = [look for look in Cutter(1.0).take(t, kind, values) if look.travel() > 0.01][:6]
-    steps = learn(rig(), noise_of(rig()), first, SETTINGS)
+    steps, (_, _, slowly) = learn(rig(), noise_of(rig()), first, SETTINGS), clean
     with pytest.raises(StopIteration) as end:
         while True:
             next(steps)
-    at_once, (monitor, _) = end.value.value, watched_from_start(CLEAN, SETTINGS)
-    learned = {h.name: (h.value, h.common) for h in monitor.changes._base.hypotheses}
+    at_once = end.value.value
+    learned = {h.name: (h.value, h.common) for h in slowly._base.hypotheses}
     assert learned == {h.name: (h.value, h.common) for h in at_once._base.hypotheses}
-    assert monitor.changes._scatter.scale == pytest.approx(at_once._scatter.scale, rel=1e-12)
+    assert slowly._scatter.scale == pytest.approx(at_once._scatter.scale, rel=1e-12)
     assert learned["spring.stiffness"][0] == pytest.approx(BENCH.plant.k_s, rel=2e-3)
     assert learned["coulomb_friction.torque"][0] == pytest.approx(BENCH.plant.coulomb, rel=0.02)
 
@@ -128,15 +136,12 @@ def test_learning_over_a_while_is_learning_at_one_go():
 def test_a_change_that_no_cause_explains_is_not_looked_at_closer_for_ever():
     """Looks of each second and fits that find nothing would take more of a core than a joint may have."""
     settings, rng = WatchSettings(learn=5, every=2.0, fitted=3), np.random.default_rng(1)
-    monitor, looks = Monitor(rig(), noise_of(rig()), settings), []
-    for bench, start, length in ((BENCH, 0.0, 30.0), (BENCH.with_values(resonance=0.4), 30.0, 30.0)):
-        run = record_command(bench, command(length, 2), rng)
-        t, kind, values = events_of(run)
-        for k in range(0, len(t), 210):
-            before = monitor.looks
-            monitor.take(t[k : k + 210] + start, kind[k : k + 210], values[k : k + 210])
-            looks += [monitor.now] * (monitor.looks - before)
-            if monitor.job is not None:
-                monitor.conclude(monitor.job())
+    monitor, looks = Monitor(rig(), noise_of(rig()), settings), [0.0]
+
+    def note():
+        looks.extend([monitor.now] * (monitor.looks - len(looks) + 1))
+
+    play(monitor, BENCH, 30.0, rng, noted=note)
+    play(monitor, BENCH.with_values(resonance=0.4), 30.0, rng, start=30.0, noted=note)
     assert [f.code for f in monitor.findings()] == ["RSEA_UNEXPLAINED"]
     assert min(np.diff(looks[-4:])) > 1.5

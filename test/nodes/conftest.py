@@ -9,14 +9,20 @@ from pathlib import Path
 
 import pytest
 import rclpy
+from rcl_interfaces.msg import Parameter, ParameterValue
+from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.lifecycle import LifecycleNode
 
 from msg_adapters.ros import Trigger
 from rsea_ros.nodes import driver
 from rsea_ros.nodes._run import PROFILE
-from test.nodes.stalls import every
 from test.nodes.warm import parent
+
+try:  # a message costs half as much of the processor
+    from rclpy.experimental import EventsExecutor
+except ImportError:  # of an older distribution
+    EventsExecutor = SingleThreadedExecutor
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
@@ -27,6 +33,8 @@ SOCKETS = "driver", "controller"
 """Nodes that have a profile of their own."""
 AGAIN = 15.0
 """s without an answer, which no service takes."""
+LOOK = 0.004
+"""s between looks: one for each message that is heard takes more of the processor than hearing it."""
 
 
 class Process:
@@ -100,31 +108,43 @@ def start(tmp_path_factory):
 class Listener:
     """A node in this process; it spins while it waits for something to be true."""
 
-    def __init__(self):
+    def __init__(self, executor):
         with pytest.MonkeyPatch.context() as patch:  # the first node of a process reads its profile
             patch.setenv(PROFILE, QUICK[PROFILE])
             rclpy.init()
             self.node = rclpy.create_node("listener")
-        self._executor = SingleThreadedExecutor()
-        self._executor.add_node(self.node)
+        self.executor = executor()
+        self.executor.add_node(self.node)
         self.subscriptions, self._clients = [], {}
 
     def serve(self, node):
-        """Spin another node of this process too, until it is dropped."""
-        self._executor.add_node(node)
+        """Spin another node of this process too, until it is dropped. Its module says SERVES."""
+        assert isinstance(self.executor, SingleThreadedExecutor)
+        self.executor.add_node(node)
 
     def drop(self, node):
         """Serve a node no more, and take it away."""
-        self._executor.remove_node(node)
+        self.executor.remove_node(node)
         node.destroy_node()
 
-    def until(self, condition):
-        """Spin until the condition holds, and return what it returned."""
-        deadline = time.monotonic() + TIMEOUT
-        while not (result := condition()):
-            assert time.monotonic() < deadline, "waited in vain"
-            self._executor.spin_once(timeout_sec=0.01)  # conditions that command are heard in time
-        return result
+    def until(self, condition, act=lambda: None, mend=lambda: None, pause=1.5):
+        """Spin until the condition holds, and return what it returned.
+
+        act: done before each look, such as to command. mend: done once in `pause` s, such as to clear what a
+        machine that stalls has latched. Looks are LOOK apart, in which everything is heard that comes.
+        """
+        begun = mended = time.monotonic()
+        while True:
+            act()
+            if result := condition():
+                return result
+            now = time.monotonic()
+            assert now < begun + TIMEOUT, "waited in vain"
+            if now > mended + pause:
+                mended = now
+                mend()
+            while time.monotonic() < now + LOOK:  # with another time rclpy forgets what else was ready
+                self.executor.spin_once(timeout_sec=LOOK)
 
     def call(self, name, kind=Trigger, request=None):
         """Call a service; return its answer.
@@ -141,13 +161,8 @@ class Listener:
             answers.append(client.call_async(request or kind.Request()))
 
         ask()
-        ask_again = every(AGAIN, ask)
-
-        def answered():
-            ask_again()
-            return next((answer for answer in answers if answer.done()), None)
-
-        return self.until(answered).result()
+        done = self.until(lambda: next((a for a in answers if a.done()), None), mend=ask, pause=AGAIN)
+        return done.result()
 
     def hear(self, kind, topic, qos):
         """Return a list that fills with the messages of a topic."""
@@ -163,15 +178,15 @@ class Listener:
 
     def close(self):
         """Take the node away."""
-        self._executor.shutdown()
+        self.executor.shutdown()
         self.node.destroy_node()
         rclpy.shutdown()
 
 
 @pytest.fixture(scope="module")
-def listener():
-    """One listener for a module's tests."""
-    node = Listener()
+def listener(request):
+    """One listener for a module's tests. SERVES in a module: it spins nodes of the package, too."""
+    node = Listener(SingleThreadedExecutor if hasattr(request.module, "SERVES") else EventsExecutor)
     yield node
     node.close()
 
@@ -186,14 +201,20 @@ def what_a_test_hears(request):
         listener.forget(kept)
 
 
+DRIVEN = {parameter.name: parameter.default for parameter in driver.TABLE} | {
+    "rate": 200.0, "autostart": True, "resume": True, "command_timeout": 5.0,
+}  # fmt: skip
+"""Parameters of a driver that is active at once, and patient."""
+
+
 @pytest.fixture
 def make_driver(listener):
-    """A function that makes a driver in this process: name, values of its parameters; closed in the end."""
+    """A function that makes a driver in this process, by DRIVEN or other values, and those that are given."""
     made = []
 
-    def make(name, values, overrides=()):
+    def make(name, *overrides, values=None, **given):
         node = LifecycleNode(name, namespace=name, parameter_overrides=list(overrides))
-        made.append((driver.DriverNode(node, values), node))
+        made.append((driver.DriverNode(node, (values or DRIVEN) | given), node))
         listener.serve(node)
         return made[-1]
 
@@ -201,3 +222,24 @@ def make_driver(listener):
     for program, node in made:
         program.close()
         listener.drop(node)
+
+
+DOUBLE = 3
+
+
+@pytest.fixture
+def put(listener):
+    """A function that sets parameters of a node over its service; its answer's reason, empty for none."""
+
+    def ask(node, **values):
+        request = SetParametersAtomically.Request()
+        for name, value in values.items():
+            told = ParameterValue(type=DOUBLE, double_value=value)
+            request.parameters.append(Parameter(name=name.replace("__", "."), value=told))
+        name = node if isinstance(node, str) else node.get_fully_qualified_name()
+        service = f"{name}/set_parameters_atomically"
+        answer = listener.call(service, SetParametersAtomically, request).result
+        assert answer.successful == (not answer.reason)
+        return answer.reason
+
+    return ask

@@ -1,6 +1,5 @@
 """A driver node on a simulated bench, and a driver made of a script."""
 
-import time
 from pathlib import Path
 
 from lifecycle_msgs.msg import Transition
@@ -9,7 +8,7 @@ from lifecycle_msgs.srv import ChangeState
 from msg_adapters.ros import DiagnosticArray, JointState, Trigger, torque_command_message
 from rsea_ros.hardware.dynamixel.control_tables import TABLES
 from rsea_ros.nodes._qos import COMMAND
-from test.nodes.stalls import every, is_stall
+from test.nodes.stalls import is_stall
 
 ROOT = Path(__file__).resolve().parents[2]
 PATIENT = {
@@ -17,8 +16,6 @@ PATIENT = {
     "resume": True,
 }  # fmt: skip
 """A machine that is busy with other tests must not look like a fault."""
-WAIT = 55.0
-"""s for what normally takes one: the driver starts and compiles beside other tests."""
 
 
 class Driven:
@@ -39,17 +36,9 @@ class Driven:
 
     def push(self, condition, torque=10.0, mend=lambda: None):
         """Command a torque until the condition holds; clear what a busy machine has latched."""
-        begun = time.monotonic()
-        mend_now_and_then = every(1.5, lambda: (self._clear_stall(), mend()))
-
-        def push_commands():
-            assert time.monotonic() < begun + WAIT, self.process.output[-5:]
-            self.publish(torque)
-            if not (result := condition()):
-                mend_now_and_then()
-            return result
-
-        self._listener.until(push_commands)
+        self._listener.until(
+            condition, lambda: self.publish(torque), lambda: (self._clear_stall(), mend())
+        )
 
     def publish(self, torque):
         """Publish a command."""

@@ -22,16 +22,3 @@ def until(condition, seconds=40.0):
         assert time.monotonic() < deadline, "waited in vain"
         time.sleep(0.005)
     return result
-
-
-def every(seconds, act):
-    """Return a function that may be called at any rate and acts once in `seconds`, first after them."""
-    acted = time.monotonic()
-
-    def call():
-        nonlocal acted
-        if time.monotonic() - acted > seconds:
-            acted = time.monotonic()
-            act()
-
-    return call

@@ -15,7 +15,6 @@ from msg_adapters.ros import (
 from rsea_ros.hardware.dynamixel.control_tables import TABLES
 from rsea_ros.nodes._qos import COMMAND, MEASUREMENT
 from test.nodes.on_wire import newest_status, value_in
-from test.nodes.stalls import every
 from test.nodes.torque_loop import GAINS
 from test.nodes.warm import Bench
 
@@ -53,14 +52,8 @@ class Wire:
 
     def hold(self, torque, condition):
         """Request a torque until a condition holds; clear faults from stalls of the machine."""
-        clear_now_and_then = every(2.0, self.clear_latched)
-
-        def done():
-            self.desired.publish(torque_command_message(time.time_ns(), torque))
-            clear_now_and_then()
-            return condition()
-
-        self.listener.until(done)
+        command = lambda: self.desired.publish(torque_command_message(time.time_ns(), torque))  # noqa: E731
+        self.listener.until(condition, command, self.clear_latched, 2.0)
 
 
 @pytest.fixture(scope="module")

@@ -1,15 +1,16 @@
 """Steps of the controller's node without ROS: faults, releases, desired torques, zeros, and its report."""
 
-from __future__ import annotations
-
 import math
 import threading
+from itertools import count
 from types import SimpleNamespace
 
 import pytest
 
 from rsea_ros.control.controller import Measurement
+from rsea_ros.control.grid import Grid
 from rsea_ros.nodes import controller as module
+from rsea_ros.nodes._commands import CommandQueue
 from rsea_ros.nodes._health import ERROR, OK, WARN
 from rsea_ros.nodes.controller import ControllerNode
 
@@ -264,3 +265,18 @@ def test_a_loss_of_the_links_encoder_is_told_while_it_lasts(made):
     assert list(node._loss_words()) == ["without the link's motion: deflection was lost for a moment"]
     encoder.used = False
     assert list(node._loss_words()) == []
+
+
+def test_a_command_for_a_late_measurement_acts_in_the_next_cycle_all_the_same(made):
+    """Measurements are 0.3 periods behind their cycle, one in ten 0.7: its command acted a cycle later."""
+    node, _, out, _ = made
+    node._grid, steps = Grid(float(PERIOD)), count(1)
+    node._controller.step = lambda *a, **k: float(next(steps))
+    queue, acted = CommandQueue(strict=True), []
+    for cycle in range(5_000 * MS, 5_600 * MS, PERIOD):
+        queue.take(cycle + PERIOD // 2)
+        acted.append(queue.torque)
+        stamp = cycle + (7 if len(acted) % 10 == 0 else 3) * MS
+        node._measure(stamp, READING, 1)
+        queue.add(*out[-1], stamp)
+    assert acted == [float(k) for k in range(60)]

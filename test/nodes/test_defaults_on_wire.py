@@ -54,7 +54,6 @@ class Commanded(Driven):
         self.torque = 10.0
 
         def drive():
-            self._listener.until(lambda: True)
             if self.latched():
                 self.clear()
             self._activate()
@@ -173,7 +172,7 @@ def test_a_stop_while_a_clear_waits_for_the_sensor_holds_until_a_later_clear(wir
         listener.until(wire.latched)
         clear = wire.request("clear_fault")
         while not clear.done() and "until clear_fault" not in wire.trigger("stop").message:
-            listener.until(lambda: True)
+            pass  # the stop is asked for again
         waits = not clear.done()
         CALM(wire)
         answer = listener.until(lambda clear=clear: clear.done() and clear.result())

@@ -10,6 +10,7 @@ from functools import partial
 from pathlib import Path
 
 import pytest
+from rclpy.executors import SingleThreadedExecutor
 
 from msg_adapters.ros import JointState, torque_command_message
 from rsea_ros.nodes._bench_topics import Obeyed
@@ -147,15 +148,16 @@ def test_a_signal_acts_while_the_main_thread_waits(listener):
     sender = threading.Timer(0.1, os.kill, (os.getpid(), signal.SIGHUP))
     late = threading.Timer(0.1, lambda: order.append(reacted.wait(20.0)))
     order = []
-    pulse = Pulse(listener.node.context, 0.5)
+    pulse, executor = Pulse(listener.node.context, 0.5), SingleThreadedExecutor()
     try:
         sender.start()
         late.start()
         while not order:
-            anything_to_do([listener.node], listener._executor, pulse)
+            anything_to_do([listener.node], executor, pulse)
         assert order == [True]
     finally:
         pulse.close()
+        executor.shutdown()
         alarm.close()
         signal.signal(signal.SIGHUP, before)
 

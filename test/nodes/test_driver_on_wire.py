@@ -183,20 +183,19 @@ def test_after_sigint_the_torque_is_zero_and_off(wire):
     assert wire.goal() == (0, False)
 
 
-@pytest.mark.parametrize(
-    ("model", "number", "status", "end"),
-    [
-        (54024, signal.SIGKILL, -signal.SIGKILL, (0, False)),
-        (54025, signal.SIGKILL, -signal.SIGKILL, (0, True)),
-        ("RS03", signal.SIGKILL, -signal.SIGKILL, (0, False)),
-        ("AK10-9", signal.SIGKILL, -signal.SIGKILL, (0, False)),
-        ("DM8009", signal.SIGINT, 0, (0, False)),
-    ],
-)
-def test_after_a_kill_the_torque_is_zero_on_the_wire(bench, start, listener, model, number, status, end):
-    """By the supervisor; by the motor's own watchdog, which leaves a Dynamixel on at zero."""
-    name = f"{number.name}_{model}".lower().replace("-", "_")
-    victim = Driven(bench(model), listener, name, start)
-    victim.drive()
-    assert victim.process.stop(number) == status
-    listener.until(lambda: victim.goal() == end)
+KILLED = {
+    54024: (signal.SIGKILL, (0, False)), 54025: (signal.SIGKILL, (0, True)),
+    "RS03": (signal.SIGKILL, (0, False)), "AK10-9": (signal.SIGKILL, (0, False)),
+    "DM8009": (signal.SIGINT, (0, False)),
+}  # fmt: skip
+"""By model: the signal that ends its driver, goal and torque then, by the supervisor or by the motor's own
+watchdog, which leaves a Dynamixel on at zero."""
+
+
+def test_after_a_kill_the_torque_is_zero_on_the_wire(bench, start, listener):
+    names = {model: f"killed_{model}".lower().replace("-", "_") for model in KILLED}
+    victims = {model: Driven(bench(model), listener, names[model], start) for model in KILLED}
+    for model, (number, end) in KILLED.items():  # they begin together, and none waits for commands
+        victims[model].drive()
+        assert victims[model].process.stop(number) == (0 if number == signal.SIGINT else -number), model
+        listener.until(lambda model=model, end=end: victims[model].goal() == end)

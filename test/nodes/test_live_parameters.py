@@ -1,20 +1,26 @@
-"""Parameters of running nodes: limits go down at once and up without torque, and a refusal says why."""
+"""Nodes of this process: parameters change while they run, and what a recording and a replay hold and say."""
 
-from __future__ import annotations
+import struct
+import time
 
+import numpy as np
 import pytest
-from rcl_interfaces.msg import Parameter, ParameterValue
-from rcl_interfaces.srv import SetParametersAtomically
+import yaml
+from rcl_interfaces.msg import ParameterEvent
 from rclpy.lifecycle import LifecycleNode
+from rclpy.qos import qos_profile_sensor_data
+from rclpy.serialization import deserialize_message
 
-from msg_adapters.ros import JointState, torque_command_message
+from msg_adapters import BagWriter, iterate
+from msg_adapters.ros import Bool, Clock, JointState, torque_command_message
 from rsea_ros.nodes import driver
 from rsea_ros.nodes._joints import joint_table
 from rsea_ros.nodes._parameters import declare
-from rsea_ros.nodes._qos import COMMAND
+from rsea_ros.nodes._qos import COMMAND, LATCHED
+from rsea_ros.nodes.joint import compose
 from test.nodes.test_driver import Spy
 
-DOUBLE = 3
+SERVES = True
 
 
 @pytest.fixture
@@ -44,34 +50,13 @@ def driven(listener, monkeypatch):
         listener.drop(node)
 
 
-@pytest.fixture
-def put(listener):
-    """A function that sets parameters of a node over its service; its answer's reason, empty for none."""
-
-    def ask(node, **values):
-        request = SetParametersAtomically.Request()
-        for name, value in values.items():
-            told = ParameterValue(type=DOUBLE, double_value=value)
-            request.parameters.append(Parameter(name=name.replace("__", "."), value=told))
-        name = node if isinstance(node, str) else node.get_fully_qualified_name()
-        service = f"{name}/set_parameters_atomically"
-        answer = listener.call(service, SetParametersAtomically, request).result
-        assert answer.successful == (not answer.reason)
-        return answer.reason
-
-    return ask
-
-
 def test_a_limit_goes_down_under_torque_and_up_without(driven, put, listener):
     node, program, (spy,) = driven("changed", rate=200.0, autostart=True, resume=True, command_timeout=5.0)
     commands = listener.node.create_publisher(JointState, "/changed/torque_command", COMMAND)
 
     def until_written(torque):
-        def is_written():
-            commands.publish(torque_command_message(0, 5.0))
-            return spy.written and spy.written[-1] == torque
-
-        listener.until(is_written)
+        command = lambda: commands.publish(torque_command_message(0, 5.0))  # noqa: E731
+        listener.until(lambda: spy.written and spy.written[-1] == torque, command)
 
     until_written(5.0)
     assert put(node, torque_limit=2.0) == ""
@@ -107,3 +92,68 @@ def test_each_joint_has_limits_of_its_own(driven, put):
     assert hip == 7.0 < knee
     for values in ({"torque_limit": 6.0}, {"hip__torque_limit": 6.0, "knee__torque_limit": 6.0}):
         assert "expected limits of one joint at once, of hip, knee" in put(node, **values)
+
+
+@pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
+def test_a_bag_has_the_flag_parameters_offered_qos_and_the_distribution(listener, tmp_path, put, storage):
+    """None of them was in it: a flag that was up before and stayed so was no message at all."""
+    flag = listener.node.create_publisher(Bool, f"/{storage}/pure_torque", LATCHED)
+    desired = listener.node.create_publisher(JointState, f"/{storage}/desired_torque", COMMAND)
+    flag.publish(Bool(data=True))
+    executor = listener.executor
+    model = compose("model", executor, {"quiet": 7.0}, namespace=storage)
+    bag = tmp_path / "bag"
+    record = compose("record", executor, {"out": str(bag), "storage": storage}, namespace=storage)
+    try:
+        listener.until(desired.get_subscription_count)
+        desired.publish(torque_command_message(0, 3.0))
+        taps = record.program._taps
+        listener.until(lambda: taps["pure_torque"].count > 1 and taps["desired_torque"].count)
+        listener.until(lambda: model.node.get_fully_qualified_name() in record.program._asked)
+        written, write = [], record.program._bag.write
+        record.program._bag.write = lambda *row: written.append(row[-1]) or write(*row)
+        assert put(model.node, tolerance=0.2) == ""
+        changed = struct.pack("<d", 0.2)
+        listener.until(lambda: any(changed in raw for raw in written) and not list(record.node.clients))
+    finally:
+        model.close()
+        record.close()
+    rows = list(iterate(bag))
+    assert any(raw[-1] == 1 for topic, _, _, raw in rows if topic.endswith("/pure_torque"))
+    told = {}
+    for topic, _, _, raw in rows:
+        if topic == "/parameter_events":
+            event = deserialize_message(raw, ParameterEvent)
+            for each in (*event.new_parameters, *event.changed_parameters):
+                told[event.node, each.name] = each.value
+    assert told[f"/{storage}/model", "quiet"].double_value == 7.0
+    assert told[f"/{storage}/model", "tolerance"].double_value == 0.2
+    known = yaml.safe_load((bag / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
+    assert known["ros_distro"] == "kilted"
+    offered = {
+        topic["topic_metadata"]["name"]: topic["topic_metadata"]["offered_qos_profiles"]
+        for topic in known["topics_with_message_count"]
+    }
+    (qos,) = offered[f"/{storage}/desired_torque"]
+    assert (qos["reliability"], qos["durability"]) == ("reliable", "volatile")
+    assert {each["durability"] for each in offered[f"/{storage}/pure_torque"]} == {"transient_local"}
+
+
+def test_the_clock_of_a_replay_goes_on_through_a_pause_and_follows_its_pace(listener, tmp_path):
+    """It stood still for as long as the bag had no message."""
+    with BagWriter(tmp_path / "bag") as bag:
+        for second in (100, 101):
+            bag.write("/still/flag", "std_msgs/msg/Bool", second * 10**9, bytes([0, 1, 0, 0, 1]))
+    heard = []
+    told = "/clock", lambda m: heard.append((time.monotonic(), m.clock.sec + 1e-9 * m.clock.nanosec))
+    listener.subscriptions.append(listener.node.create_subscription(Clock, *told, qos_profile_sensor_data))
+    given = {"bag": str(tmp_path / "bag"), "subscribers": 0, "rate": 2.0}
+    replay = compose("replay", listener.executor, given)
+    try:
+        listener.until(replay.program.is_finished)
+    finally:
+        replay.close()
+    at, clock = np.array(heard).T
+    assert len(at) > 25 and clock[0] < 100.4 and clock[-1] > 100.7
+    lag = at - clock / 2.0
+    assert np.ptp(lag) < 0.2 and np.all(np.diff(clock) >= 0.0)

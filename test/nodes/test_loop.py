@@ -5,12 +5,24 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from rclpy.serialization import serialize_message
 
 from msg_adapters import BagWriter, iterate, read_record, write_record
-from msg_adapters.ros import Clock, JointState, WrenchStamped, stamp_of
+from msg_adapters.ros import (
+    Clock,
+    JointState,
+    WrenchStamped,
+    deflection_message,
+    stamp_of,
+    torque_command_message,
+    wrench_message,
+)
+from msg_adapters.topic_map import FIELDS, ROLES, TYPES
 from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
+from rsea_ros.nodes import record
+from rsea_ros.nodes._bench_topics import SPRING_FRAME
 from rsea_ros.nodes._qos import COMMAND, MEASUREMENT, RECORD_RELIABLE
 from rsea_ros.records.record import Channel
 
@@ -64,7 +76,7 @@ def test_excite_interrupted_ends_with_zero_and_a_recording_by_itself_after_its_d
     states = listener.hear(JointState, "/rsea/joint_states", MEASUREMENT)
     plant = start("plant", rig=RIG)
     listener.until(lambda: states)
-    record = start("record", out=tmp_path / "bag", duration=2.0, storage="sqlite3")
+    record = start("record", out=tmp_path / "bag", duration=1.0, storage="sqlite3")
     excite = start("excite", duration=100.0, kind="white_noise", amplitude=5.0, ramp=0.0)
     listener.until(lambda: sum(m.effort[0] != 0.0 for m in commands) > 50)
     assert excite.stop(signal.SIGINT) == 130
@@ -90,3 +102,31 @@ def test_a_recording_that_exists_is_refused(start, tmp_path):
     assert record.wait() == 2
     assert len(record.output) == 1 and "exists already, expected a new name" in record.output[0]
     assert len(list(iterate(tmp_path / "bag.mcap"))) == 1
+
+
+
+
+START = 1_700_000_000 * 10**9
+
+
+@pytest.mark.parametrize(("frame", "kept"), [(SPRING_FRAME.default, False), ("ft_sensor", True)])
+def test_a_bag_has_the_deflection_and_only_a_sensors_torque(tmp_path, frame, kept):
+    angles = 0.01 * np.sin(np.arange(50) / 5.0)
+    with BagWriter(tmp_path / "run.mcap") as bag:
+        for k, angle in enumerate(angles):
+            stamp = START + k * 3_571_429
+            for topic, message in (
+                ("torque_command", torque_command_message(stamp, 10.0 * angle)),
+                ("deflection", deflection_message(stamp, angle, frame=SPRING_FRAME.default)),
+                ("ft", wrench_message(stamp, (0.0,) * 5 + (1500.0 * angle,), frame=frame)),
+            ):
+                bag.write(f"/rsea/{topic}", TYPES[topic], stamp, bytes(serialize_message(message)))
+    run = read_record(tmp_path / "run.mcap")
+    assert run["deflection"].y == pytest.approx(angles, abs=1e-12)
+    assert ("ft" in run) is kept
+    told = [note for note in run.notes if "no sensor's, the stiffness of a rig times" in note]
+    assert bool(told) is not kept
+
+
+def test_everything_that_a_record_is_made_of_is_recorded():
+    assert set(ROLES) == set(FIELDS) <= set(record.TOPICS)

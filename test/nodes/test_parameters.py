@@ -1,4 +1,4 @@
-"""Parameters: a wrong value is refused in one line with status 2."""
+"""Parameters: what ROS is told of them, and a wrong value is refused in one line with status 2."""
 
 import importlib
 import math
@@ -11,7 +11,8 @@ import pytest
 import yaml
 
 from rsea_ros.errors import ParameterError
-from rsea_ros.nodes._parameters import NodeParameter, _refuse_unknown
+from rsea_ros.nodes import _parameters
+from rsea_ros.nodes._parameters import DERIVED, NodeParameter, _descriptor, _refuse_unknown, stated_limits
 from rsea_ros.processes import ENDING
 from test.nodes.conftest import as_argument
 
@@ -77,8 +78,6 @@ WRONG = {
     "watch": ({"host": "192.0.2.7"}, "page on 192.0.2.7, port 8270: Cannot assign requested address"),
     "identify": ({"rigg": "x"}, "parameter rigg: no such parameter, expected one of rig, out"),
 }
-
-
 PROCESSES = ("controller", "driver", "plant")
 """Nodes that are started as processes: how they publish and live stays with a process."""
 
@@ -123,3 +122,30 @@ def test_a_node_that_is_interrupted_while_it_imports_says_so_in_one_line():
 def test_a_mistyped_parameter_is_answered_with_the_right_one():
     with pytest.raises(ParameterError, match=r"parameter amplitud: .*, did you mean amplitude\?"):
         _refuse_unknown({"amplitud": 3.0}, [NodeParameter("amplitude", 20.0, "peak", "N m", 0.0, 1e4)])
+
+
+@pytest.mark.parametrize(
+    ("parameter", "about", "expected", "bounds"),
+    [
+        (NodeParameter("a", 1.0, "s", "N m", 0.0, 2.0), "s, N·m", "a number from 0 to 2 N·m", (0.0, 2.0)),
+        (NodeParameter("b", 3, "count", "", 1.0, 9), "count", "a whole number from 1 to 9", (1, 9)),
+        (NodeParameter("c", True, "whether"), "whether", "true or false", None),
+        (NodeParameter("d", "x", "kind", choices=("x", "y")), "kind", "one of x, y", None),
+        (NodeParameter("e", ["x"], "names"), "names", "a list of texts", None),
+    ],
+)
+def test_a_range_is_told_in_the_type_of_its_parameter(monkeypatch, parameter, about, expected, bounds):
+    monkeypatch.setattr(_parameters, "parameter_descriptor", lambda *told, fixed: (*told, fixed))
+    told = _descriptor(parameter)
+    assert told == (about, f"expected {expected}", bounds, True)
+    if bounds is not None:
+        assert [type(v) for v in told[2]] == [type(parameter.default)] * 2
+
+
+@pytest.mark.parametrize(("value", "limit"), [(5.0, 5.0), (0.0, math.inf), (DERIVED, None)])
+def test_a_limit_of_zero_is_none_but_that_of_the_torque(value, limit):
+    assert stated_limits({"slew_limit": value}, ["slew"]) == ({} if limit is None else {"slew": limit})
+    torque = stated_limits({"torque_limit": value}, ["torque"])
+    assert torque == ({} if limit is None else {"torque": value})
+    with pytest.raises(ParameterError, match=r"slew_limit = -2, expected -1 to derive it, or at least 0"):
+        stated_limits({"slew_limit": -2.0}, ["slew"])

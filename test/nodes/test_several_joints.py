@@ -17,10 +17,11 @@ from rsea_ros.nodes._joint import stop
 from rsea_ros.nodes._joints import joint_table
 from rsea_ros.nodes._qos import COMMAND, MEASUREMENT
 from test.nodes.on_wire import newest_status, value_in
-from test.nodes.stalls import every, is_stall
+from test.nodes.stalls import is_stall
 from test.nodes.test_driver import Spy
 from test.nodes.warm import Bench
 
+SERVES = True
 JOINTS = ("hip", "knee", "ankle")
 TRIALS = 10
 X = {
@@ -107,14 +108,11 @@ class Leg:
 
     def until(self, condition):
         """Wait for a condition; clear what a machine that stands still has latched."""
-        clear_now_and_then = every(0.5, self.clear_stalls)
+        self.listener.until(condition, self.lives, self.clear_stalls, 0.5)
 
-        def holds():
-            assert self.process.is_running(), self.process.output[-5:]
-            clear_now_and_then()
-            return condition()
-
-        self.listener.until(holds)
+    def lives(self):
+        """See that the driver has not ended."""
+        assert self.process.is_running(), self.process.output[-5:]
 
     def clear_stalls(self):
         """Clear faults that no test here provokes: commands may cease, too, on a machine that stalls."""
@@ -222,7 +220,7 @@ def test_a_joint_that_is_stopped_while_another_one_is_cleared_stays_stopped(make
     """The clear of all joints reached it later than its stop, and ended that: 10 N m after an answer."""
     spies = {"hip": Spy(), "knee": Spy()}
     monkeypatch.setattr(driver, "DEVICES", {"simulated": lambda values: spies[values["joint"]]})
-    program, _ = make_driver("held", values_of(joints=["hip", "knee"], autostart=True, resume=True))
+    program, _ = make_driver("held", values=values_of(joints=["hip", "knee"], autostart=True, resume=True))
     hip, knee = program.joints
     stop([hip, knee])
     for joint in (hip, knee):

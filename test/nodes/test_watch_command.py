@@ -1,6 +1,4 @@
-"""When a page may command, on which stamps, within which limits; and how a silent node is shown."""
-
-from __future__ import annotations
+"""When a page may command, on which stamps, within which limits; how a silent node is shown."""
 
 import math
 from types import SimpleNamespace
@@ -8,7 +6,7 @@ from types import SimpleNamespace
 import pytest
 
 from rsea_ros.nodes import watch as module
-from rsea_ros.nodes.watch import WatchCommand, _put, _status_json
+from rsea_ros.nodes.watch import ANSWER, LOOK, WatchCommand, _put, _status_json
 from rsea_ros.watch.command import Bounds
 
 MS = 1_000_000
@@ -118,3 +116,63 @@ def test_a_node_that_falls_silent_is_shown_stale_with_what_it_said():
     _put(rows, 1.0, ft=2.0, position=0.1)
     _put(rows, 2.0, ft=3.0)
     assert rows == {"ft": [(1.0, 2.0), (2.0, 3.0)], "position": [(1.0, 0.1)]}
+
+
+class Answer:
+    """The answer to one request; comes when it is told to."""
+
+    def add_done_callback(self, callback):
+        self.come = lambda: callback(answer(8.0, 100.0, 20.0))
+
+
+@pytest.fixture
+def bench(monkeypatch):
+    """A live view beside a bench: it, its clock, the names of the benches, and the requests so far."""
+    clock, names, requests = [0.0], ["driver"], []
+
+    def request(limits):
+        requests.append(Answer())
+        return requests[-1]
+
+    client = SimpleNamespace(services_are_ready=lambda: True, get_parameters=request)
+    monkeypatch.setattr(module, "AsyncParameterClient", lambda node, name: client)
+    monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: clock[0]))
+    infos = {"joint_states": names, "torque_command": ["watch"]}
+    node = SimpleNamespace(
+        create_publisher=lambda *_: None,
+        resolve_topic_name=lambda name: name,
+        get_fully_qualified_name=lambda: "/watch",
+        get_publishers_info_by_topic=lambda name: [
+            SimpleNamespace(node_namespace="/", node_name=n) for n in infos[name]
+        ],
+    )
+    values = {"rate": 280.0, "limit": 10.0, "growth": 40.0, "joint": "rsea"}
+    return WatchCommand(node, SimpleNamespace(newest=0), values), clock, names, requests
+
+
+def look_for(watch, clock, seconds):
+    for _ in range(round(seconds / LOOK)):
+        watch.look()
+        clock[0] += LOOK
+
+
+def test_limits_are_requested_again_where_the_answer_was_lost(bench):
+    """DDS may lose the answer to a node that has only just been found: the page then never commanded."""
+    watch, clock, _, requests = bench
+    look_for(watch, clock, 4.0 * ANSWER)
+    assert 2 < len(requests) <= 5 and watch.why_not == "/driver has not said its limits yet"
+    requests[-1].come()
+    look_for(watch, clock, 4.0 * ANSWER)
+    assert watch.commander.bounds.torque == 8.0 and watch.why_not == ""
+    assert len(requests) <= 5, "it asked on"
+
+
+def test_limits_of_a_bench_that_has_left_do_not_count(bench):
+    watch, clock, names, requests = bench
+    look_for(watch, clock, LOOK)
+    names[0] = "plant"
+    look_for(watch, clock, LOOK)
+    requests[0].come()
+    assert watch.commander.bounds is None
+    requests[1].come()
+    assert watch.commander.bounds.torque == 8.0

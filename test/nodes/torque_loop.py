@@ -17,7 +17,6 @@ from msg_adapters.ros import (
 from rsea_ros.nodes._cycle import SECOND
 from rsea_ros.nodes._qos import COMMAND, MEASUREMENT, RECORD_RELIABLE
 from test.nodes.on_wire import newest_status
-from test.nodes.stalls import every
 
 RATE = 280.0
 GAINS = {"k_p": 0.163, "k_d": 0.003528, "k_i": 1.173, "q_frequency": 8.679, "k_w": 39.9}
@@ -83,14 +82,7 @@ class Loop:
 
     def hold(self, torque, condition):
         """Publish a constant torque until a condition holds."""
-        mend_now_and_then = every(1.5, self.mend)
-
-        def done():
-            self.desire(torque)
-            mend_now_and_then()
-            return condition()
-
-        self.listener.until(done)
+        self.listener.until(condition, lambda: self.desire(torque), self.mend)
 
     def values(self):
         """Key and value of the controller's newest status."""

@@ -1,14 +1,84 @@
-"""Priorities and processors of threads, in a process of its own so that the tests keep theirs."""
+"""Nodes as processes: they start, keep their priorities and end."""
 
 import os
+import runpy
+import signal
 import subprocess
 import sys
+import warnings
 from pathlib import Path
 
+import pytest
+import rclpy
+from rclpy.executors import SingleThreadedExecutor
+from std_msgs.msg import Empty
+
 from bench.processes import may_have
+from rsea_ros.nodes._policies import NODES
+from rsea_ros.nodes._waiter import Pulse, anything_to_do
+
+
+@pytest.mark.parametrize("name", NODES)
+def test_a_node_is_a_program(name, monkeypatch, capsys):
+    monkeypatch.setattr(sys, "argv", [name, "--help"])
+    with warnings.catch_warnings(), pytest.raises(SystemExit) as left:
+        warnings.simplefilter("ignore", RuntimeWarning)  # it has been imported before, and runs once more
+        runpy.run_module(f"rsea_ros.nodes.{name}", run_name="__main__")
+    assert left.value.code == 0
+    assert capsys.readouterr().out.startswith(f"usage: ros2 run rsea_ros {name} ")
+
 
 ROOT = Path(__file__).resolve().parents[2]
-PROGRAM = """
+STUCK = """
+import sys, time
+from rsea_ros.nodes._run import Component, Program
+
+class Stuck(Program):
+    def __init__(self, node, values):
+        self.node = node
+
+    def is_finished(self):
+        self.node.get_logger().info("looked", once=True)
+        while {stuck}:
+            time.sleep(1e6)
+        return False
+
+sys.exit(Component("stuck", (), Stuck, patience={patience}).run())
+"""
+
+
+def test_a_node_without_unfinished_work_ends_after_its_patience():
+    """model outlived SIGINT until SIGKILL, and nobody knew where."""
+    programs = []
+    for stuck, patience in ((True, 0.5), (False, 30.0)):
+        command = [sys.executable, "-c", STUCK.format(stuck=stuck, patience=patience)]
+        process = subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, text=True)
+        programs.append((stuck, process))
+    for stuck, process in programs:
+        assert "looked" in process.stderr.readline()
+        process.send_signal(signal.SIGINT)
+        said = process.communicate(timeout=50.0)[1]
+        assert process.returncode == stuck
+        assert ("in is_finished" in said) == stuck
+
+
+def test_what_another_thread_has_just_destroyed_ends_no_node():
+    """It was looked up, destroyed by a thread of a session, and then waited for: RCLError ended the node."""
+    rclpy.init(context=(context := rclpy.Context()))
+    quiet = rclpy.create_node("quiet", context=context, enable_rosout=False, start_parameter_services=False)
+    executor, pulse = SingleThreadedExecutor(context=context), Pulse(context, 0.05)
+    gone = quiet.create_subscription(Empty, "gone", lambda message: None, 1)
+    try:
+        gone.handle.destroy_when_not_in_use()
+        assert gone in quiet.subscriptions
+        assert not anything_to_do([quiet], executor, pulse)
+    finally:
+        pulse.close()
+        quiet.destroy_node()
+        context.shutdown()
+
+
+PRIORITIES = """
 import os, subprocess, sys, threading
 from rsea_ros.errors import ParameterError
 from rsea_ros.nodes._realtime import raise_new_threads, raise_priority, stop_keeping_time
@@ -43,7 +113,7 @@ stop.set()
 
 def test_threads_that_keep_time_get_their_priority_all_others_one_below_and_children_none():
     """One that began later lost the processor with the interpreter's lock, and two others spun for it."""
-    command = [sys.executable, "-c", PROGRAM]
+    command = [sys.executable, "-c", PRIORITIES]
     said = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
     expected = "20 19 0 20 19 19 15 0 0 0 0 0 0" if may_have(20) else "parameter realtime_priority = 20: "
     assert said.stdout.startswith(expected), said.stderr
