@@ -28,6 +28,8 @@ from rsea_ros.records.record import Channel, FloatArray, Record
 
 FAMILIES = ("open", "second", "loop", "second", "sea", "second", "rigid", "second")
 """Plants in the order in which records are made; `second` judges the others."""
+IN_LOOP = ("loop", "rigid")
+"""Plants that a position loop drives."""
 GROUPS = {
     "one": 0.15,
     "two": 0.22,
@@ -85,7 +87,8 @@ def _plan(k: int, rng: np.random.Generator) -> Plan:
     if group.startswith("off"):
         laws = list(OFF_CATALOGUE) if family == "second" else [n for n, f in LAWS.items() if family in f.on]
         off = (str(rng.choice(laws)), float(rng.choice((0.5, 1.0, 1.6)) * rng.uniform(0.8, 1.2)))
-    kinds = ("work", "work", "steps") if family in ("loop", "rigid") else ("chirp", "multisine", "work")
+    known = LAWS[off[0]].known_as if off and family != "second" else ""  # not for the diagnosis to use
+    kinds = ("work", "work", "steps") if family in IN_LOOP else ("chirp", "multisine", "work")
     return Plan(
         name=f"{k:04d}-{family}-{group}",
         family=family,
@@ -95,15 +98,9 @@ def _plan(k: int, rng: np.random.Generator) -> Plan:
         duration=float(rng.choice((10.0, 12.0))),
         hidden=hidden,
         off=off,
-        without=kin_of(names[0]) if group == "taken_out" else _unknown(family, off),
+        without=kin_of(names[0]) if group == "taken_out" else (known,) if known in catalogue() else (),
         coloured=float(rng.choice((0.0, 0.0, 0.05, 0.2))),
     )
-
-
-def _unknown(family: str, off: tuple[str, float] | None) -> tuple[str, ...]:
-    """Return the effect of the catalogue that a law equals, which the diagnosis may not use."""
-    known = LAWS[off[0]].known_as if off and family != "second" else ""
-    return (known,) if known in catalogue() else ()
 
 
 def _sizes(name: str, family: str, rng: np.random.Generator) -> dict[str, float]:
@@ -115,15 +112,11 @@ def _sizes(name: str, family: str, rng: np.random.Generator) -> dict[str, float]
 
 def _drawn_effects(family: str, count: int, rng: np.random.Generator) -> list[str]:
     """Return effects that are not confused with each other, of those that a plant can show."""
-    effects = catalogue()
     possible = [n for n in SIZES if family != "rigid" or n in ON_RIGID]
     possible = [n for n in possible if family != "sea" or n not in NOT_ON_SEA]
     chosen: list[str] = []
     for name in rng.permutation(possible):
-        alike = set(effects[name].claims.confusable_with) | {
-            n for n in possible if name in effects[n].claims.confusable_with
-        }
-        if len(chosen) < count and not alike & set(chosen):
+        if len(chosen) < count and not {*kin_of(name)[1:]} & {*chosen}:
             chosen.append(str(name))
     return chosen
 
@@ -141,7 +134,7 @@ def _command(plan: Plan, rng: np.random.Generator) -> FloatArray:
     if plan.excitation == "multisine":
         return odd_multisine(plan.duration, rng, period=5.0 if plan.duration != 12.0 else 4.0)
     levels = 30.0 * work(plan.duration, rng, smooth=plan.excitation == "work")
-    noise = 0.0 if plan.family in ("loop", "rigid") else 1.0  # no loop has white noise in its reference
+    noise = 0.0 if plan.family in IN_LOOP else 1.0  # no loop has white noise in its reference
     return levels + noise * rng.normal(size=len(levels))
 
 
@@ -163,33 +156,18 @@ def _simulate(plan: Plan, rng: np.random.Generator) -> tuple[Record, Rig]:
     t = np.arange(round(plan.duration * RATE)) / RATE
     commanded = _command(plan, rng)
     acting = law.command(commanded, plan.off[1]) if law and law.command and plan.off else commanded
-    names = [n for n in stated.sensors if n != "reference"]
-    blank = {n: Channel(t + 1.0 / RATE, np.zeros(len(t))) for n in names}
-    channels = {"command": Channel(t, acting), **blank}
-    if plan.family in ("loop", "rigid"):
-        channels = _with_loop(channels, true, commanded, acting)
+    names, late = [n for n in stated.sensors if n != "reference"], t + 1.0 / RATE
+    channels = {"command": Channel(t, acting), **{n: Channel(late, np.zeros(len(t))) for n in names}}
+    if plan.family in IN_LOOP:  # with a reference, rad, that demands about the commanded torque
+        softness = 2.0 / true["spring.stiffness"] if not true.rigid_spring else 0.02
+        channels |= {"command": Channel(t, acting - commanded), "reference": Channel(t, softness * commanded)}
     outputs = simulate(true, Record(channels, plan.name))
     measured = {n: measure(true, n, outputs[n], rng) for n in names}
     if law and law.sensor and plan.off:
         measured = law.sensor(measured, plan.off[1], t, rng)
-    record = Record(
-        {
-            **{n: Channel(c.t, c.y) for n, c in channels.items() if n not in measured},
-            **{n: Channel(t + 1.0 / RATE, y) for n, y in measured.items()},
-        },
-        plan.name,
-    )
-    commands = measured["motor_torque"] if plan.family in ("loop", "rigid") else commanded
-    stamps = t + 1.0 / RATE if plan.family in ("loop", "rigid") else t
-    record = record.with_channels(command=Channel(stamps, commands))
-    return _with_colour(record, plan, rng), stated
-
-
-def _with_loop(channels, rig: Rig, commanded: FloatArray, acting: FloatArray):
-    """Return channels with a reference (rad) that demands about the commanded torque."""
-    softness = 2.0 / rig["spring.stiffness"] if not rig.rigid_spring else 0.02
-    reference = Channel(channels["command"].t, softness * commanded)
-    return {**channels, "command": Channel(reference.t, acting - commanded), "reference": reference}
+    channels |= {n: Channel(late, y) for n, y in measured.items()}
+    in_loop = Channel(late, measured["motor_torque"]) if plan.family in IN_LOOP else Channel(t, commanded)
+    return _with_colour(Record(channels | {"command": in_loop}, plan.name), plan, rng), stated
 
 
 def rig_of(family: str) -> Rig:

@@ -17,7 +17,7 @@ from pathlib import Path
 from statistics import median
 from typing import Any, NamedTuple
 
-from bench.driver.loop import RATE, Loop
+from bench.driver.loop import RATE, Loop, graded
 from bench.driver.requests import requests
 from rsea_ros.hardware.peer.remote import RemoteBench
 
@@ -207,7 +207,7 @@ def faults(folder: Path, *, can: str = "") -> Iterator[tuple[str, str, str]]:
             text = text + f"{median(cycles):g} cycles, " if trial.latched else ""
             told = f"latched {latched} of {RUNS} {cause or '-'}, ends by {ends}"
             told += f"; {again} done again: {why}" if again else ""
-            yield name, asked, f"{'ok  ' if good else 'NOT '} {text}{told}"
+            yield name, asked, graded(text + told, good)
         loop.device.close()
     if not can:
         yield from requests(folder)
@@ -240,17 +240,11 @@ def _once(loop: Loop, bench: RemoteBench, trial: Trial) -> Run:
         age = HOST[trial.wrong[1]["what"]](loop) or 0.0
     else:
         begun = bench.ask(trial.wrong[0], **trial.wrong[1])["t"]
-    cycles = 0
-    while loop.guarded.fault is None and cycles < (400 if trial.latched else 60):
-        loop.cycle(10.0, age and age + cycles / RATE)
-        cycles += 1
+    cycles = loop.cycles(400 if trial.latched else 60, loop.is_latched, age)
     cause = loop.guarded.fault.cause if loop.guarded.fault else ""
-    guard, ramped = loop.guarded.guard, cycles
-    while guard.torque != 0.0 and ramped < cycles + 60:
-        loop.cycle(10.0, age and age + ramped / RATE)
-        ramped += 1
+    cycles += loop.cycles(60, lambda: loop.guarded.guard.torque == 0.0, age and age + cycles / RATE)
     for _ in range(6):
-        loop.cycle(10.0, age)
+        loop.cycle(age)
     log = bench.log(begun)["torque"]
     acted = max((at for at, (_, goal, on) in enumerate(log) if goal and on), default=-1)
     ended = log[acted + 1][0] if acted + 1 < len(log) else log[-1][0] if log else begun
@@ -259,8 +253,8 @@ def _once(loop: Loop, bench: RemoteBench, trial: Trial) -> Run:
     if trial.service == "reboot":
         bench.ask("set", voltage=240)
     for _ in range(6):  # what is put right is a step of its own, of the position, which a reading must have
-        loop.cycle(10.0, age)
-    return Run((ended - begun) * RATE / 1e9, ramped, cause, _recover(loop, trial.service))
+        loop.cycle(age)
+    return Run((ended - begun) * RATE / 1e9, cycles, cause, _recover(loop, trial.service))
 
 
 def _signal_supervisor(loop: Loop, number: int) -> None:

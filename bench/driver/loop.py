@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 
 from rsea_ros.errors import DeviceError
 from rsea_ros.hardware.bus_motor import BusMotor
@@ -19,6 +20,11 @@ from rsea_ros.nodes._devices import limits_of
 from rsea_ros.nodes.driver import TABLE
 
 RATE, STIFFNESS = 280.0, 1530.456
+
+
+def graded(told: str, good: bool) -> str:
+    """Return what was measured behind whether it is as required."""
+    return f"{'ok  ' if good else 'NOT '} {told}"
 
 
 class Loop:
@@ -46,17 +52,28 @@ class Loop:
         self.states: list[State] = []
         self.spent: list[float] = []
 
-    def cycle(self, torque: float, age: float = 0.0) -> State | None:
-        """Wait for the next deadline and do one cycle. age: of the command, s."""
+    def cycle(self, age: float = 0.0) -> None:
+        """Wait for the next deadline and do one cycle under 10 N·m. age: of the command, s."""
         now = time.monotonic_ns()
         self._due = max(self._due + self._period, now - self._period)
         time.sleep(max(0.0, self._due - now) / 1e9)
         begin = time.monotonic_ns()
-        state = self.guarded.cycle(torque, age)
+        state = self.guarded.cycle(10.0, age)
         self.spent.append((time.monotonic_ns() - begin) / 1e9)
         if state is not None:
             self.states.append(state)
-        return state
+
+    def cycles(self, most: int, until: Callable[[], object] = lambda: False, age: float = 0.0) -> int:
+        """Return after how many cycles a condition holds. age: of a command that ceased, s; else 0."""
+        done = 0
+        while done < most and not until():
+            self.cycle(age and age + done / RATE)
+            done += 1
+        return done
+
+    def is_latched(self) -> bool:
+        """Return whether a fault is latched."""
+        return self.guarded.fault is not None
 
     def call(self, service: str) -> str:
         """Call a service; return `done`, or its error."""
@@ -68,9 +85,7 @@ class Loop:
 
     def drive(self) -> None:
         """Run until torque acts; clear what a stall of the machine has latched."""
-        while True:
-            for _ in range(20):
-                self.cycle(10.0)
-            if self.guarded.fault is None:
-                return
+        self.cycles(20)
+        while self.is_latched():
             self.call("clear")
+            self.cycles(20)

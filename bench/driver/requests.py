@@ -17,7 +17,7 @@ from subprocess import Popen
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from bench.driver.loop import RATE, Loop
+from bench.driver.loop import RATE, Loop, graded
 from rsea_ros.errors import DeviceError, ParameterError
 from rsea_ros.hardware import supervisor
 from rsea_ros.hardware.device import NoReply
@@ -39,7 +39,7 @@ def requests(folder: Path) -> Iterator[Row]:
         for name, trial in TRIALS.items():
             loop = _loop(bench)
             required, told, good = trial(loop)
-            yield name, required, f"{'ok  ' if good else 'NOT '} {told}"
+            yield name, required, graded(told, good)
             with suppress(DeviceError):
                 loop.device.close()
             _restore(bench)
@@ -65,13 +65,12 @@ def _restore(bench: RemoteBench) -> None:
     bench.ask("set", torque_limit=620, homing_offset=0, mode=0, hardware_error=0)
 
 
-def _acting(loop: Loop, since: int) -> tuple[int, int]:
-    """Run cycles under command; return how many writes acted since an instant, and in the last of them."""
-    for _ in range(SETTLED):
-        loop.cycle(10.0)
+def _acting(loop: Loop, since: int | None = None) -> tuple[int, int]:
+    """Run cycles; return how many writes acted since an instant, else from now on, and in the last cycles."""
+    since = loop.bench.ask("torque")["t"] if since is None else since
+    loop.cycles(SETTLED)
     late = loop.bench.ask("torque")["t"]
-    for _ in range(CYCLES):
-        loop.cycle(10.0)
+    loop.cycles(CYCLES)
     log = loop.bench.log(since)["torque"]
     acting = [t for t, goal, on in log if goal and on]
     return len(acting), sum(t >= late for t in acting)
@@ -86,20 +85,19 @@ def meanwhile(service: str, request: str, *, first: str = "") -> Trial:
     def trial(loop: Loop) -> tuple[str, str, bool]:
         loop.drive()
         loop.bench.ask("misbehave", ft_silent=True)
-        while loop.guarded.fault is None:
-            loop.cycle(10.0)
+        while not loop.is_latched():
+            loop.cycle()
         if first:
             getattr(loop.guarded, first)()
         answers: list[str] = []
         thread = threading.Thread(target=lambda: answers.append(loop.call(service)))
         thread.start()
-        for _ in range(round(0.3 * RATE)):
-            loop.cycle(10.0)
+        loop.cycles(round(0.3 * RATE))
         _REQUESTS[request](loop)
         loop.bench.ask("misbehave", ft_silent=False)
         while thread.is_alive():
-            loop.cycle(10.0)
-        acted, late = _acting(loop, loop.bench.ask("torque")["t"])
+            loop.cycle()
+        acted, late = _acting(loop)
         return NO_TORQUE, f"{late} writes of a torque, {service}: {answers[0]}", acted == late == 0
 
     return trial
@@ -116,9 +114,9 @@ def stop_then_reboot(loop: Loop) -> tuple[str, str, bool]:
     """A reboot after a stop."""
     loop.drive()
     loop.guarded.stop()
-    loop.cycle(10.0)
+    loop.cycle()
     answer = loop.call("reboot")
-    acted, late = _acting(loop, loop.bench.ask("torque")["t"])
+    acted, late = _acting(loop)
     return NO_TORQUE, f"{late} writes of a torque, reboot: {answer}", acted == 0
 
 
@@ -128,7 +126,7 @@ def stop_in_activation(loop: Loop) -> tuple[str, str, bool]:
     enable, guarded = loop.device.enable, loop.guarded
     loop.device.enable = lambda: (guarded.stop(), enable())  # type: ignore[method-assign,assignment]
     answer = loop.call("enable")
-    acted, late = _acting(loop, loop.bench.ask("torque")["t"])
+    acted, late = _acting(loop)
     return NO_TORQUE, f"{late} writes of a torque, activation: {answer}", acted == 0 and answer != "done"
 
 
@@ -138,7 +136,7 @@ def other_motor(service: str, *, done: bool = False, **how: int) -> Trial:
     def trial(loop: Loop) -> tuple[str, str, bool]:
         loop.drive()
         loop.guarded.guard.trip(FAULT)
-        loop.cycle(10.0)
+        loop.cycle()
         if service == "enable":
             loop.guarded.clear()
             loop.guarded.disable()
@@ -159,8 +157,7 @@ def renamed_adapter(loop: Loop) -> tuple[str, str, bool]:
     loop.drive()
     loop.bench.ask("vanish")
     loop.bench.ask("appear", name="another")
-    for _ in range(20):
-        loop.cycle(10.0)
+    loop.cycles(20)
     cause, answer = loop.guarded.fault, loop.call("clear")
     loop.bench.ask("vanish")
     loop.bench.ask("appear")
@@ -196,17 +193,13 @@ def supervisor_service(number: signal.Signals) -> Trial:
             loop = Loop(child.bench, supervisor=str(path))
             loop.drive()
             service.send_signal(number)
-            cycles = 0
-            while loop.guarded.fault is None and cycles < 2 * RATE:
-                loop.cycle(10.0)
-                cycles += 1
-            cause, late = loop.guarded.fault, _acting(loop, child.bench.ask("torque")["t"])[1]
+            cycles = loop.cycles(round(2 * RATE), loop.is_latched)
+            cause, late = loop.guarded.fault, _acting(loop)[1]
             service.kill()
             service.wait()
             refused, service = loop.call("clear"), Popen(words)
             while (again := loop.call("clear")) != "done" and cycles < 3 * RATE:
-                loop.cycle(10.0)
-                cycles += 1
+                cycles += loop.cycles(1)
             loop.device.close()
             service.kill()
             service.wait()
@@ -241,10 +234,10 @@ def full_disk(loop: Loop) -> tuple[str, str, bool]:
     with no_room():
         loop.drive()
         loop.guarded.stop()
-        loop.cycle(10.0)
+        loop.cycle()
         stopped = loop.bench.torque()[0]
         answer = loop.call("clear")
-        acted, _ = _acting(loop, loop.bench.ask("torque")["t"])
+        acted, _ = _acting(loop)
     told = f"stopped at {stopped}, clear: {answer}, then {acted} writes of a torque"
     return "as with room", told, stopped == 0 and answer == "done" and acted > 50
 
@@ -258,8 +251,7 @@ def _wraps(bench: RemoteBench) -> Row:
     loop.device.close()
     _restore(bench)
     good = fault is None and 0.001 < last < 0.1
-    told = f"{'ok  ' if good else 'NOT '} {last:.4f} rad, {fault}"
-    return "encoder wraps round at 2^31", "no fault, no jump", told
+    return "encoder wraps round at 2^31", "no fault, no jump", graded(f"{last:.4f} rad, {fault}", good)
 
 
 def _wrong_unit(bench: RemoteBench, name: str, value: float, unit: str) -> Row:
@@ -274,8 +266,7 @@ def _wrong_unit(bench: RemoteBench, name: str, value: float, unit: str) -> Row:
         told = "accepted"
     except ParameterError as error:
         told = f"{error}"
-    good = told != "accepted"
-    return f"{name} in {unit}: {value:g}", "refused", f"{'ok  ' if good else 'NOT '} {told}"
+    return f"{name} in {unit}: {value:g}", "refused", graded(told, told != "accepted")
 
 
 UNITS = (

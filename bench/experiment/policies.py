@@ -6,6 +6,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from rsea_ros.experiment.campaign import Rules
+from rsea_ros.experiment.proposal import peaks
 from rsea_ros.experiment.run_design import propose
 from rsea_ros.experiment.run_shape import at_rest_around
 from rsea_ros.identification.excitation import ExcitationSettings, chirp, ramp_ends
@@ -41,6 +42,7 @@ class _Played:
         self.command, self.duration, self.rate = command, len(run) / RATE, RATE
         self.names, self.chances = names, chances
         self.decided = self.resolved = 1.0
+        self.peaks = peaks(command, RATE, ())
         self.hopeless, self.energy = (), float(np.sum(command**2) / RATE)
 
 

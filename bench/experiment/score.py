@@ -145,8 +145,12 @@ def causes(
             yield f"{line['bench']} {line['cause']} {line['severity']} {short} {line['cpu']:.0f} s"
 
 
-def figures(lines):
-    """Yield the figures of the lines of a log: causes right, and excitation of each policy in pairs."""
+def summary(log: Path) -> Iterator[str]:
+    """Print the figures of the lines of a log.
+
+    log: of `causes`
+    """
+    lines = read_lines(log)
     apart = [x for x in lines if x["shown"] and x["cause"] not in ALIKE]
     right = [x for x in apart if good(x, "designed")]
     alike = [x for x in lines if x["cause"] in ALIKE]
@@ -188,14 +192,6 @@ def _pairs(pairs, policy):
 def good(x, policy):
     """Return whether a policy confirmed the right cause."""
     return x[policy]["end"] == "confirmed" and x[policy]["cause"] == x["cause"]
-
-
-def summary(log: Path) -> Iterator[str]:
-    """Print the figures of the lines of a log.
-
-    log: of `causes`
-    """
-    yield from figures(read_lines(log))
 
 
 def limits(runs: int = 10_000) -> Iterator[str]:

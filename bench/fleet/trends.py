@@ -162,7 +162,7 @@ def _joint(name: str, wear: Wear | None, season: np.ndarray, rng: np.random.Gene
         causes[k].append(_cause("torque_constant_error", "gain", "1", 1.01, 3e-3, rng))
     if wear and wear.fault:
         for k in np.flatnonzero((share > 0.0) & (rng.random(n) < 0.7)):
-            faults[k].append(wear.fault)
+            faults[k].append({"kind": wear.fault})
     history = {c: np.concatenate([part[c] for part in parts]) for c in parts[0]}
     recordings = common | {"outcome": np.full(n, "done"), "verdict": np.full(n, "explained"),
                            "residual": np.ones(n), "faults": faults, "causes": causes}  # fmt: skip

@@ -158,20 +158,19 @@ def _late(c: Channel) -> Channel:
     return Channel(c.t + 1e5, c.y)
 
 
-MEASURED = CHANNELS
 STAMPS: Mapping[str, Callable[[Record], Record]] = {
     "even": lambda r: r,
     "hour forward": _each(lambda c: _step(c, 3600.0)),
     "year forward": _each(lambda c: _step(c, 3.15e7)),
-    "states hour forward": _each(lambda c: _step(c, 3600.0), *MEASURED),
+    "states hour forward": _each(lambda c: _step(c, 3600.0), *CHANNELS),
     "command hour forward": _each(lambda c: _step(c, 3600.0), "command"),
     "back": _each(lambda c: _step(c, -0.3 * float(c.t[-1] - c.t[0]))),
     "gap": _each(lambda c: _gap(c, 0.1)),
     "wide gap": _each(lambda c: _gap(c, 0.8)),
-    "gap of states": _each(lambda c: _gap(c, 0.3), *MEASURED),
+    "gap of states": _each(lambda c: _gap(c, 0.3), *CHANNELS),
     "jitter": _each(_jitter),
     "same": _each(lambda c: Channel(np.full(len(c), c.t[0]), c.y)),
-    "apart": _each(_late, *MEASURED),
+    "apart": _each(_late, *CHANNELS),
     "repeated": _each(lambda c: Channel(np.repeat(c.t[::2], 2)[: len(c)], c.y)),
 }
 
@@ -190,21 +189,21 @@ def _spike(c: Channel, value: float) -> Channel:
 
 SENSORS: Mapping[str, Callable[[Record], Record]] = {
     "none": lambda r: r,
-    "all still": _each(lambda c: _hold(c, 0.125), *MEASURED),
-    "all zero": _each(lambda c: _hold(c, 0.0), *MEASURED),
+    "all still": _each(lambda c: _hold(c, 0.125), *CHANNELS),
+    "all zero": _each(lambda c: _hold(c, 0.0), *CHANNELS),
     "ft zero": _each(lambda c: _hold(c, 0.0), "ft"),
     "ft constant": _each(lambda c: _hold(c, 1.7), "ft"),
     "position zero": _each(lambda c: _hold(c, 0.0), "position"),
     "velocity zero": _each(lambda c: _hold(c, 0.0), "velocity"),
     "motor torque zero": _each(lambda c: _hold(c, 0.0), "motor_torque"),
     "frozen": _each(_freeze, "ft", "position"),
-    "nan": _each(lambda c: _spike(c, np.nan), *MEASURED),
+    "nan": _each(lambda c: _spike(c, np.nan), *CHANNELS),
     "infinite": _each(lambda c: _spike(c, np.inf), "ft", "velocity"),
-    "1e308": _each(lambda c: _spike(c, 1e308), *MEASURED),
-    "all 1e300": _each(lambda c: Channel(c.t, c.y * 1e300), *MEASURED),
-    "all 1e-300": _each(lambda c: Channel(c.t, c.y * 1e-300), *MEASURED),
-    "few": _each(lambda c: Channel(c.t[:5], c.y[:5]), *MEASURED),
+    "1e308": _each(lambda c: _spike(c, 1e308), *CHANNELS),
+    "all 1e300": _each(lambda c: Channel(c.t, c.y * 1e300), *CHANNELS),
+    "all 1e-300": _each(lambda c: Channel(c.t, c.y * 1e-300), *CHANNELS),
+    "few": _each(lambda c: Channel(c.t[:5], c.y[:5]), *CHANNELS),
     "nan all": _each(lambda c: _hold(c, np.nan), "ft", "velocity"),
     "command nan": _each(lambda c: _spike(c, np.nan), "command"),
-    "squared": _each(lambda c: Channel(c.t, np.abs(c.y)), *MEASURED),
+    "squared": _each(lambda c: Channel(c.t, np.abs(c.y)), *CHANNELS),
 }

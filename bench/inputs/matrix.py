@@ -116,7 +116,7 @@ def other_cases(seed: int, quick: bool) -> list[Case]:
     export = [{"verb": "export", "rig": r} for r in names]
     odd = [1e-300, 1e-3, 1.0, 1e3, 1e300, 0.0, -1.0, "nan", "inf"]
     options = ("torque", "bandwidth", "inertia", "mass", "diameter", "separation", "spring-radius",
-               "deflection",               "tolerance-db", "tolerance-deg", "stiffness")  # fmt: skip
+               "deflection", "tolerance-db", "tolerance-deg", "stiffness")  # fmt: skip
     design = [{"verb": "design", "option": o, "value": v} for o in options for v in odd]
     design += [{"verb": "design", "option": "tolerance-deg", "value": v} for v in (89.9, 90, 90.1, 180)]
     groups = [simulate, control, export, design]
