@@ -87,7 +87,7 @@ def _sine_along(motion: Motion, keep: BoolArray, torque: FloatArray, pulsation: 
     The filter of the motion keeps only what passes slowly: the sine that is fitted is filtered alike.
     """
     period = float(motion.t[1] - motion.t[0])
-    waves = [smooth(wave(pulsation * motion.q), period)[keep] for wave in (np.sin, np.cos)]
+    waves = [motion.compared(smooth(wave(pulsation * motion.q), period))[keep] for wave in (np.sin, np.cos)]
     return _sum_of(waves, torque)
 
 
