@@ -30,7 +30,7 @@ from rsea_ros.effects import signal_table as st
 from rsea_ros.errors import IdentificationError
 from rsea_ros.model.equations import Mechanics, mechanics, with_structure
 from rsea_ros.model.extent import SKIPPED_START, check_extent, check_slow
-from rsea_ros.model.rig import END_NAMES, Rig, check_unfiltered
+from rsea_ros.model.rig import END_NAMES, Rig, Sensor, check_unfiltered
 from rsea_ros.model.simulation import Machine, build
 from rsea_ros.model.step import Calls, call_port
 from rsea_ros.records.holds import AT_EDGE, PERIODS
@@ -179,7 +179,10 @@ def motion_from(record: Record, rig: Rig | None = None) -> Motion:
     rate = np.gradient(shown["deflection"], step) if "deflection" in shown else _nothing()
     ft, d = (np.asarray(shown.get(n, _nothing())[::finer], np.float64) for n in ("ft", "deflection"))
     command = _nothing() if "motor_torque" in record else record["command"].held(fine + 0.5 * step)
-    counts = counts[::finer] & ~_reverses(v, period) if beside else counts[::finer]
+    counts = counts[::finer]
+    noise = rig.sensors.get("position", Sensor()).level if rig is not None else 0.0
+    moves = counts & ~_at_rest(np.interp(t, position.t, position.y), noise, period)
+    counts = moves if np.count_nonzero(moves) >= FEWEST else counts
     torque = _likeliest(torques, [a, v, np.sign(v), np.ones(len(t)), ft if len(ft) else d], counts)
     return Motion(t, q, v, a, torque, counts, command, ft, d, np.asarray(rate[::finer]))
 
@@ -215,18 +218,20 @@ _INSTANTS, _FAR_BETTER = 9, 0.5
 """Tried within a sample. Of the power that is left: a torque whose hold is not the log's leaves far more."""
 
 
-def _reverses(v: FloatArray, period: float) -> BoolArray:
-    """Return where a filtered motion is nearly at rest, or was within the filter's reach: a gear that sticks
-    holds by any torque there, which no law of the speed says."""
-    from scipy.ndimage import binary_dilation
+def _at_rest(position: FloatArray, noise: float, period: float) -> BoolArray:
+    """Return where a gear stands still as far as its encoder tells, or did so within the filter's reach.
 
-    slow = np.abs(v) < _NEARLY_AT_REST * float(np.sqrt(np.mean(v**2)))
-    reach = math.ceil(1.0 / (CUT_OFF * period))
-    return np.asarray(binary_dilation(slow, np.ones(2 * reach + 1, bool)), bool)
+    Any torque below its friction holds it there, which no law of the speed says. position: rad, not filtered.
+    """
+    from scipy.ndimage import binary_dilation, maximum_filter1d, minimum_filter1d
+
+    width = 2 * math.ceil(1.0 / (CUT_OFF * period)) + 1
+    travel = maximum_filter1d(position, width) - minimum_filter1d(position, width)
+    return np.asarray(binary_dilation(travel <= _RANGE * noise, np.ones(width, bool)), bool)
 
 
-_NEARLY_AT_REST = 0.02
-"""Of the speed's RMS."""
+_RANGE = 6.0
+"""Sigmas between the highest and the lowest of a hundred readings of one angle."""
 _FILTERED = ("position", "motor_torque", "deflection", "ft")
 _BRIDGED = 0.1
 """s. A shorter silence of a motion is a line, and counts."""
