@@ -28,7 +28,7 @@ import numpy as np
 from rsea_ros.compiler import njit
 from rsea_ros.effects import signal_table as st
 from rsea_ros.errors import IdentificationError
-from rsea_ros.model.equations import Mechanics, mechanics, with_structure
+from rsea_ros.model.equations import Mechanics, gear_inertia, mechanics, with_structure
 from rsea_ros.model.extent import SKIPPED_START, check_extent, check_slow
 from rsea_ros.model.rig import END_NAMES, Rig, Sensor, check_unfiltered
 from rsea_ros.model.simulation import Machine, build
@@ -121,6 +121,29 @@ def _behind_corner(values: FloatArray, corner: float, period: float) -> FloatArr
 def is_inverse(rig: Rig) -> bool:
     """Return whether a rig is compared by torque: nothing that it has holds it, so that it drifts."""
     return (rig.rigid_spring or rig.motion == "measured") and rig.loop is None
+
+
+def spring_mode(rig: Rig) -> float:
+    """Return the frequency at which rotor and load of a free output swing against each other, Hz."""
+    inertias = gear_inertia(rig) + rig["chassis.inertia"], rig["spring_end.inertia"]
+    return math.sqrt(rig["spring.stiffness"] * sum(1.0 / inertia for inertia in inertias)) / (2.0 * math.pi)
+
+
+def as_seen(rig: Rig, records: Sequence[Record]) -> Rig:
+    """Return a rig with a rigid spring where the output drifts freely and no record can show the spring.
+
+    Its mode lies above the rate at which all records were sampled, and no deflection was measured. Rotor and
+    load turn as one; a simulation from the commands alone would run away, the torque along the motion tells.
+    """
+    free = rig.clamped == frozenset({"housing_end"}) and not rig["spring_end.stiffness"]
+    if rig.rigid_spring or rig.loop is not None or rig.motion != "simulated" or rig.conditions or not free:
+        return rig
+    if not all("position" in r and "deflection" not in r for r in records):
+        return rig
+    if spring_mode(rig) < max(c.rate for r in records for c in r.channels.values() if len(c) > 1):
+        return rig
+    kept = {n: q for n, q in rig.quantities.items() if not n.startswith("spring.")}
+    return replace(rig, quantities=kept, rigid_spring=True)
 
 
 def require_position(record: Record) -> None:
