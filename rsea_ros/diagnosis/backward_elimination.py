@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
 
@@ -31,6 +32,7 @@ from rsea_ros.diagnosis.step_fits import QUICK_FIT, ScreenedEffect, screen
 from rsea_ros.effects.catalogue import effect_named, look_alikes
 from rsea_ros.effects.effect import Effect
 from rsea_ros.effects.guess import Guess
+from rsea_ros.errors import RseaError
 from rsea_ros.identification.fit import add_effect
 from rsea_ros.identification.problem import Problem
 from rsea_ros.identification.solver import Pools, Solution, bounded_step, jacobian_columns
@@ -119,7 +121,8 @@ class ReducedModels:
             guesses = initial_guesses(rival, view_for(rival, model.cases, rig, rest.outputs))
         guesses += [{**rival.typical, **same}] if old.unit == rival.main.unit else []
         can_be_nothing = math.isfinite(old.null) and not old.logarithmic
-        guesses += [in_exchange(model.solution, name, rival)] if can_be_nothing else []
+        with suppress(RseaError):  # an effect that the rig cannot have
+            guesses += [in_exchange(model.solution, name, rival)] if can_be_nothing else []
         screened = screen(solution, rival, guesses)
         if screened is None or not (is_listed(rival, name) or self._is_close(screened, model)):
             return None

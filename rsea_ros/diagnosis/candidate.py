@@ -11,7 +11,7 @@ from rsea_ros.diagnosis.settings import DEFAULT, BlockSettings, DiagnosisSetting
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.effects.effect import Effect
 from rsea_ros.effects.signal_table import sensor_of
-from rsea_ros.identification.noise_level import reestimate_noise
+from rsea_ros.identification.fit import with_noise_of
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Map, Solution, serial, solve
 from rsea_ros.identification.unknowns import LOOP_CLOCK, Unknown
@@ -279,9 +279,7 @@ def _change(
 
 def with_noise_reestimated(model: Candidate) -> Candidate:
     """Return a candidate with the noise that its own residual shows, scored against that."""
-    ratio = model.problem.rig["gear.ratio"]
-    runs = zip(model.cases, model.outputs, strict=True)
-    return rescore(model, tuple(reestimate_noise(c, out, ratio) for c, out in runs))
+    return rescore(model, with_noise_of(model.cases, model.solution, model.outputs))
 
 
 def rescore(model: Candidate, cases: tuple[Case, ...]) -> Candidate:

@@ -22,7 +22,7 @@ from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.effects.effect import Effect
 from rsea_ros.errors import IdentificationError
 from rsea_ros.identification.confidence import stated_differences, torque_scale
-from rsea_ros.identification.fit import unknowns_of, with_even_clocks
+from rsea_ros.identification.fit import as_recorded, unknowns_of, with_even_clocks
 from rsea_ros.identification.identify import lost_behind
 from rsea_ros.identification.problem import Problem, case_from
 from rsea_ros.identification.result import Remark
@@ -60,6 +60,7 @@ def diagnose(
     holdout = bound_values(with_command(holdout, rig)) if holdout is not None else None
     for record in [*records, *([holdout] if holdout is not None else [])]:
         check_diagnosable(record)
+    rig, unseen = as_recorded(rig, records)
     checked, remarks = _steady([check(r, rig) for r in records], rig)
     nominal = nominal_problem(checked, rig, settings)
     tested = _steady([check(holdout, rig)], rig)[0][0] if holdout is not None else None
@@ -75,7 +76,7 @@ def diagnose(
     cut = stretches_of(used, nominal, settings)
     lost = _lost_cycles(result)
     known = (*torque_scale(nominal), *stated_differences(nominal))
-    return replace(result, remarks=(*lost, *remarks, *cut, *known, *result.remarks))
+    return replace(result, remarks=(*unseen, *lost, *remarks, *cut, *known, *result.remarks))
 
 
 def _lost_cycles(result: Diagnosis) -> tuple[Remark, ...]:

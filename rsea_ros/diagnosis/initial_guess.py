@@ -87,7 +87,7 @@ def _sine_along(motion: Motion, keep: BoolArray, torque: FloatArray, pulsation: 
     The filter of the motion keeps only what passes slowly: the sine that is fitted is filtered alike.
     """
     period = float(motion.t[1] - motion.t[0])
-    waves = [smooth(wave(pulsation * motion.q), period)[keep] for wave in (np.sin, np.cos)]
+    waves = [motion.compared(smooth(wave(pulsation * motion.q), period))[keep] for wave in (np.sin, np.cos)]
     return _sum_of(waves, torque)
 
 
@@ -127,21 +127,34 @@ def _periodogram(angle: FloatArray, torque: FloatArray) -> tuple[FloatArray, Flo
 def torque_along(
     case: Case, rig: Rig, outputs: Mapping[str, FloatArray]
 ) -> tuple[FloatArray, FloatArray] | None:
-    """Return the measured position (rad) and the torque that is missing at the gear there, N m.
+    """Return the measured angle of the gear (rad) and the torque that is missing at the gear there, N m.
 
-    outputs: simulated channels of the case. None without a position.
+    outputs: simulated channels of the case. None where nothing that was measured shows that angle.
     """
     if isinstance(case.drive, Motion):
         return _along(case.drive, case, outputs)
-    if "position" not in case.measured:
+    channel, per_unit = _angle_shown(case, rig)
+    if not channel:
         return None
-    t, keep = case.t["position"], case.mask["position"]
+    t, keep = case.t[channel], case.mask[channel]
     residual = {n: np.where(case.mask[n], residual_of(case, outputs, n), 0.0) for n in outputs}
     injector, period = Injector(rig, case.drive, case.t), float(np.median(np.diff(t)))
     missing = missing_torque(case, residual, injector, period)
     middle = case.drive.start + missing.t + 0.5 * period
     known = np.interp(middle, t, keep.astype(float)) == 1.0
-    return np.interp(middle, t, case.measured["position"])[known], missing.torque[known]
+    return per_unit * np.interp(middle, t, case.measured[channel])[known], missing.torque[known]
+
+
+def _angle_shown(case: Case, rig: Rig) -> tuple[str, float]:
+    """Return a channel that shows the gear's angle, and rad per its unit; an empty name where none does.
+
+    Beyond a spring whose far end is held, deflection is that angle, and F/T that angle times the stiffness.
+    """
+    shown = {"position": 1.0}
+    if {"housing_end", "spring_end"} <= rig.clamped:
+        shown |= {"deflection": 1.0}
+        shown |= {"ft": 1.0 / rig["spring.stiffness"]} if rig.ft_end == "spring_end" else {}
+    return next(((n, per_unit) for n, per_unit in shown.items() if n in case.measured), ("", 0.0))
 
 
 def _along(motion: Motion, case: Case, outputs: Mapping[str, FloatArray]) -> tuple[FloatArray, FloatArray]:

@@ -39,6 +39,7 @@ from rsea_ros.identification.fit import add_effect
 from rsea_ros.identification.problem import Problem, with_unknown_start
 from rsea_ros.identification.solver import Pools, Solution, bounded_step, jacobian_columns, power, solve
 from rsea_ros.identification.unknowns import apply, start_vector, theta_with
+from rsea_ros.model.drive import Drive
 from rsea_ros.records.record import FloatArray
 
 _DAMPING = 1e-6
@@ -269,9 +270,11 @@ class StepFits:
 
         A free simulation of a high gear ratio may settle in other detents. But the measured
         angle contains the motion by every other cause, so such a model counts only where it leaves
-        little: otherwise it imitates another missing effect.
+        little: otherwise it imitates another missing effect. None without a measured position.
         """
         base = self.on_pieces
+        if any(isinstance(c.drive, Drive) and not len(c.drive.angle) for c in base.problem.cases):
+            return []
         on_angle = replace(base, problem=replace(base.problem, on_angle=True))
         effects = [e for e in self.effects if ROTOR_ANGLE in e.reads and e.name not in base.problem.acting]
         screened = (screen(on_angle, e, self.guesses[e.name]) for e in effects)

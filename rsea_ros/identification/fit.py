@@ -33,7 +33,7 @@ from rsea_ros.identification.clocks import (
 )
 from rsea_ros.identification.confidence import Confidence, confidence_of, interval
 from rsea_ros.identification.noise_level import reestimate_noise
-from rsea_ros.identification.problem import Case, Problem, case_from, weighted_residual
+from rsea_ros.identification.problem import Case, Problem, case_from, weighted_residual, with_noise_along
 from rsea_ros.identification.result import Remark
 from rsea_ros.identification.solver import Map, Pools, Solution, serial, solve
 from rsea_ros.identification.start import scale_of
@@ -48,9 +48,17 @@ from rsea_ros.identification.unknowns import (
     vector_of,
     with_effect,
 )
-from rsea_ros.model.inverse import is_inverse
+from rsea_ros.model.inverse import as_seen, is_inverse, spring_mode
 from rsea_ros.model.rig import Rig
 from rsea_ros.records.record import MEASURED, BoolArray, Channel, FloatArray, Record
+
+
+def as_recorded(rig: Rig, records: Sequence[Record]) -> tuple[Rig, tuple[Remark, ...]]:
+    """Return a rig with no spring that no record could show, and the remark that says so."""
+    seen = as_seen(rig, records)
+    rates = [c.rate for r in records for c in r.channels.values() if len(c) > 1]
+    remark = Remark("unseen_spring", values=(spring_mode(rig), max(rates))) if seen is not rig else None
+    return seen, () if remark is None else (remark,)
 
 
 def misfit_ratios(solution: Solution) -> dict[str, float]:
@@ -100,24 +108,24 @@ def fit(
         start = apply(rig, rest.unknowns, first.theta)[0]
     solution = solve(problem, _better_start(problem, start, run), run=run)
     outputs = problem.outputs(solution.theta)
-    known = with_noise_of(problem, outputs)
+    known = with_noise_of(problem.cases, solution, outputs)
     changes = [b.noise[n] / a.noise[n] for a, b in zip(cases, known, strict=True) for n in a.noise]
     if not all(1.0 / _OTHER_NOISE < change < _OTHER_NOISE for change in changes):
         solution = solve(replace(problem, cases=known), solution.theta, run=run)
         outputs = problem.outputs(solution.theta)
-        known = with_noise_of(solution.problem, outputs)
+        known = with_noise_of(solution.problem.cases, solution, outputs)
     drifting = with_drifts(solution, run)
     if drifting is not solution:
         solution, problem = drifting, drifting.problem
         outputs = problem.outputs(solution.theta)
-        known = with_noise_of(problem, outputs)
+        known = with_noise_of(problem.cases, solution, outputs)
     required = required_clocks(solution)
     if required.clocks:
         solution = solve(*free_clocks(solution, required), run=run)
         solution = solve(*without_needless(solution), run=run)
         problem = solution.problem
         outputs = problem.outputs(solution.theta)
-        known = with_noise_of(problem, outputs)
+        known = with_noise_of(problem.cases, solution, outputs)
     for _ in range(_REWEIGHTINGS):
         ratios = ratios_of(problem, solution.problem.cases, outputs)
         if max(ratios.values()) < MISFIT:
@@ -128,10 +136,14 @@ def fit(
     return solution, known, required
 
 
-def with_noise_of(problem: Problem, outputs: Sequence[dict[str, FloatArray]]) -> tuple[Case, ...]:
-    """Return the cases with the noise that the residual of simulated outputs shows."""
-    ratio = problem.rig["gear.ratio"]
-    return tuple(reestimate_noise(c, out, ratio) for c, out in zip(problem.cases, outputs, strict=True))
+def with_noise_of(
+    cases: Sequence[Case], solution: Solution, outputs: Sequence[dict[str, FloatArray]]
+) -> tuple[Case, ...]:
+    """Return cases with the noise that the residual of a solution's outputs shows."""
+    problem = solution.problem
+    rig = apply(problem.rig, problem.unknowns, solution.theta)[0]
+    runs = ((with_noise_along(rig, c), out) for c, out in zip(cases, outputs, strict=True))
+    return tuple(reestimate_noise(c, out, rig["gear.ratio"]) for c, out in runs)
 
 
 def _better_start(problem: Problem, start: Rig | None, run: Map) -> FloatArray:

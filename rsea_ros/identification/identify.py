@@ -24,7 +24,16 @@ from rsea_ros.identification.confidence import (
     torque_scale,
     undetermined_remarks,
 )
-from rsea_ros.identification.fit import Evened, ExtendedFit, alternatives, even_out, fit, ratios_of, span_all
+from rsea_ros.identification.fit import (
+    Evened,
+    ExtendedFit,
+    alternatives,
+    as_recorded,
+    even_out,
+    fit,
+    ratios_of,
+    span_all,
+)
 from rsea_ros.identification.frequency_response import model_response, responses_of
 from rsea_ros.identification.problem import Case, case_from
 from rsea_ros.identification.result import (
@@ -123,6 +132,7 @@ def identify(
         check_usable(record)
     records = [bound_values(record) for record in records]
     check_excited(records)
+    rig, unseen = as_recorded(rig, records)
     cases = tuple(case_from(record, rig) for record in records)
     report("frequency responses", 0.2)
     responses = responses_of(records[0], rig)
@@ -145,7 +155,7 @@ def identify(
     confidence = with_even_clocks(doubt, solution, records, steady.records)
     result = _result(solution, outputs, records, cases, responses, others, confidence)
     report("done", 1.0)
-    return replace(result, remarks=(*steady.remarks, *result.remarks), clocks=required.remarks)
+    return replace(result, remarks=(*unseen, *steady.remarks, *result.remarks), clocks=required.remarks)
 
 
 def _misfits(solution: Solution, cases: Sequence[Case]) -> bool:

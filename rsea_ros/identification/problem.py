@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
@@ -10,11 +9,11 @@ from types import MappingProxyType
 import numpy as np
 
 from rsea_ros.errors import IdentificationError
-from rsea_ros.identification.noise import least_noise, noise_floor, top_of_band
+from rsea_ros.identification.noise import least_noise, noise_floor
 from rsea_ros.identification.unknowns import Clocks, Unknown, apply
 from rsea_ros.model.drive import Drive, SpringStart, outside_gaps, zero_unknown
 from rsea_ros.model.extent import SKIPPED_START
-from rsea_ros.model.inverse import CUT_OFF, Motion, acting_torque, is_inverse, motion_from, torques_along
+from rsea_ros.model.inverse import Motion, acting_torque, is_inverse, motion_from, noise_along, torques_along
 from rsea_ros.model.position_loop import with_command
 from rsea_ros.model.rig import Rig, Sensor
 from rsea_ros.model.sensor_filter import SensorFilter
@@ -155,8 +154,7 @@ def channels_that_tell(record: Record, rig: Rig) -> list[str]:
 def _inverse_case(record: Record, rig: Rig) -> Case:
     """Make a record that is judged along its measured motion ready: its torques against those that it takes.
 
-    Noise: the part that passes the filter of the white noise at the top of a torque's band, or
-    where that is not flat of the stated noise, if that is more.
+    Noise: what passes the filter of the noise of all that was measured. A command has none.
     """
     motion, torque = motion_from(record, rig), acting_torque(record)
     for name, channel in (("position", record["position"]), ("the torque that acted", torque)):
@@ -165,14 +163,30 @@ def _inverse_case(record: Record, rig: Rig) -> Case:
                 f"{record.source}: {name} holds one value, expected motion: "
                 "a rig without a spring is judged by what moves it"
             )
+    sensors = {n: rig.sensors.get(n, Sensor()) for n in MEASURED if n in record}
+    motion = motion.with_noise(rig, {n: noise_floor(record, n, sensor) for n, sensor in sensors.items()})
     judged = motion.judged
-    known = {"motor_torque": torque, **{n: record[n] for n in judged if n != "motor_torque"}}
-    return Case(
-        drive=motion, t=dict.fromkeys(judged, motion.t), measured=judged,
-        noise={n: _filtered_noise(known[n], rig.sensors.get(n, Sensor())) for n in judged},
+    return with_noise_along(rig, Case(
+        drive=motion, t=dict.fromkeys(judged, motion.t), measured=judged, noise={},
         mask=dict.fromkeys(judged, motion.counts), source=record.source,
         floating=frozenset([*judged][-1:] if len(motion.d) and rig.zero_unknown("deflection") else ()),
-    )
+    ))  # fmt: skip
+
+
+def with_noise_along(rig: Rig, case: Case) -> Case:
+    """Return a case with the noise that a rig's inertia, damping and stiffness make of what was measured.
+
+    Only where torques are judged along a motion: elsewhere noise is the sensor's own.
+    """
+    if not isinstance(case.drive, Motion):
+        return case
+    least = {n: max(_ROUNDING * float(np.std(y)), 1e-300) for n, y in case.measured.items()}
+    found = noise_along(rig.under(case.source), case.drive)
+    return replace(case, noise={n: max(sigma, least[n]) for n, sigma in found.items()})
+
+
+_ROUNDING = 1e-6
+"""Of a torque's standard deviation."""
 
 
 def _without_long_faults(record: Record, masked: Mapping[str, BoolArray]) -> Record:
@@ -188,12 +202,6 @@ def _without_long_faults(record: Record, masked: Mapping[str, BoolArray]) -> Rec
 
 _LONG = 5
 """Samples in a row."""
-
-
-def _filtered_noise(torque: Channel, sensor: Sensor) -> float:
-    level, is_flat = top_of_band(torque.y)
-    noise = max(level, 0.0 if is_flat else sensor.noise) * math.sqrt(min(1.0, 2.0 * CUT_OFF / torque.rate))
-    return max(noise, 1e-6 * float(np.std(torque.y)), 1e-300)
 
 
 def simulate_cases(

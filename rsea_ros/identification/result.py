@@ -115,6 +115,7 @@ Code = Literal[
     "other_records",
     "stretches",
     "lost_cycles",
+    "unseen_spring",
 ]
 """What a remark says.
 
@@ -133,6 +134,7 @@ coloured_noise: of channels, taken from the residual.
 off_rig: the rig states a value, the data another (that, 95 % interval), so many of its stated spreads away.
 differs: a record differs from the rig, and how. other_records: of which the rig has conditions for nothing.
 stretches: of long records so many s were used, of so many.
+unseen_spring: its mode (Hz) lies above the rate (Hz) of the records, and it was taken as rigid.
 lost_cycles: so many cycles of the driver were lost, and the motor torque shows them.
 """
 

@@ -73,7 +73,7 @@ def fitted_base(records: Sequence[Record], rig: Rig) -> Base:
     start = joint_start(checked[0].record, rig) if rig.loop is not None else None
     solution = fit(parts, rig, start=start)[0]
     whole = replace(solution.problem, cases=problem.cases)
-    return Base(solution, with_noise_of(whole, whole.outputs(solution.theta)))
+    return Base(solution, with_noise_of(whole.cases, solution, whole.outputs(solution.theta)))
 
 
 MATTERS = 0.02

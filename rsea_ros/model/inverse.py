@@ -12,21 +12,25 @@ A spring whose far end something else moves (`motion: measured`: contact, walkin
     T = J q'' + B q' + T_s - (effects at the gear),   T_s = K_s d + b_s d' + (effects at the spring)
 
 with the measured deflection d: T and T_s are compared. Without d the F/T sensor's torque is T_s, and T is.
-Effects on a command are undone where only the commanded torque is known; a limit cannot be undone.
+Where only the commanded torque is known, what acted is what the effects at the command make of it, on a fine
+grid and before any filter.
 """
 
+from __future__ import annotations
+
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 
 import numpy as np
 
 from rsea_ros.compiler import njit
 from rsea_ros.effects import signal_table as st
 from rsea_ros.errors import IdentificationError
-from rsea_ros.model.equations import Mechanics, mechanics, with_structure
+from rsea_ros.model.equations import Mechanics, gear_inertia, mechanics, with_structure
 from rsea_ros.model.extent import SKIPPED_START, check_extent, check_slow
-from rsea_ros.model.rig import END_NAMES, Rig, check_unfiltered
+from rsea_ros.model.rig import END_NAMES, Rig, Sensor, check_unfiltered
 from rsea_ros.model.simulation import Machine, build
 from rsea_ros.model.step import Calls, call_port
 from rsea_ros.records.holds import AT_EDGE, PERIODS
@@ -49,9 +53,6 @@ _ROUNDS = 12
 """In which the motor's torque and what an effect makes of it agree; halves leave 1/4000. Never the measured
 torque, by which the model is judged: friction of it took its noise away."""
 
-_UNDOINGS = 4
-"""Rounds that undo what effects make of a command: delays and lags of up to 60 degrees within the band."""
-
 _COMMAND, _MOTOR, _GEAR, _SPRING, _SENSOR = (int(port) for port in st.Port if port != st.Port.STRUCTURE)
 
 
@@ -64,9 +65,11 @@ def _nothing() -> FloatArray:
 class Motion:
     """A measured motion on a uniform grid, filtered: t (s), q (rad), v (rad/s), a (rad/s^2), torque (N m).
 
-    counts: where the filter has settled, outside the gaps of the record, shape of t.
-    commanded: the torque is the command, not a measurement. Of a rig whose output is moved, ft: torque of the
-    F/T sensor (N m); d, d_rate: the spring's deflection (rad, rad/s); each empty where it was not measured.
+    counts: where the filter has settled, outside the gaps of the record, shape of t. command: N m, held over
+    each of several parts of a sample; empty where the torque was measured. Of a rig whose output is moved:
+    ft, torque of the F/T sensor (N m); d, d_rate, the spring's deflection (rad, rad/s); empty where not
+    measured. white: RMS of the noise of each channel, before the filter, in its unit. corner: Hz, above which
+    the noise of the position hides torques.
     """
 
     t: FloatArray
@@ -75,21 +78,72 @@ class Motion:
     a: FloatArray
     torque: FloatArray
     counts: BoolArray
-    commanded: bool = False
+    command: FloatArray = field(default_factory=_nothing)
     ft: FloatArray = field(default_factory=_nothing)
     d: FloatArray = field(default_factory=_nothing)
     d_rate: FloatArray = field(default_factory=_nothing)
+    white: Mapping[str, float] = field(default_factory=dict)
+    corner: float = math.inf
 
     @property
     def judged(self) -> dict[str, FloatArray]:
         """The measured torques that a model is compared with, N m; the F/T sensor's where d is known."""
         ft = {"ft": self.ft} if len(self.ft) and len(self.d) else {}
-        return {"motor_torque": self.torque, **ft}
+        return {"motor_torque": self.compared(self.torque), **ft}
+
+    def compared(self, torque: FloatArray) -> FloatArray:
+        """Return a motor torque as it is compared: at each frequency in units of the position's noise there.
+
+        Of an inertia the noise rises with the square of the frequency, and would hide what is slow.
+        """
+        return _behind_corner(torque, self.corner, float(self.t[1] - self.t[0]))
+
+    def with_noise(self, rig: Rig, white: Mapping[str, float]) -> Motion:
+        """Return the motion with the noise of its channels; a rig's inertia makes the corner of it."""
+        level = max(white.get("motor_torque", 0.0), _TORQUE_TRUST * float(np.std(self.torque)))
+        inertia = float(_as_one_part(rig)[1].mass[0, 0])
+        corner = math.sqrt(level / max(inertia * white["position"], 1e-300)) / (2.0 * math.pi)
+        return replace(self, white=white, corner=corner if corner < CUT_OFF else math.inf)
+
+
+_TORQUE_TRUST = 0.01
+"""Of a torque's RMS: a smaller error of the slow torque is not worth the fast ones."""
+
+
+def _behind_corner(values: FloatArray, corner: float, period: float) -> FloatArray:
+    from scipy.signal import butter, filtfilt
+
+    if math.isinf(corner):
+        return values
+    return np.asarray(filtfilt(*butter(1, corner * 2.0 * period), values))
 
 
 def is_inverse(rig: Rig) -> bool:
     """Return whether a rig is compared by torque: nothing that it has holds it, so that it drifts."""
     return (rig.rigid_spring or rig.motion == "measured") and rig.loop is None
+
+
+def spring_mode(rig: Rig) -> float:
+    """Return the frequency at which rotor and load of a free output swing against each other, Hz."""
+    inertias = gear_inertia(rig) + rig["chassis.inertia"], rig["spring_end.inertia"]
+    return math.sqrt(rig["spring.stiffness"] * sum(1.0 / inertia for inertia in inertias)) / (2.0 * math.pi)
+
+
+def as_seen(rig: Rig, records: Sequence[Record]) -> Rig:
+    """Return a rig with a rigid spring where the output drifts freely and no record can show the spring.
+
+    Its mode lies above the rate at which all records were sampled, and no deflection was measured. Rotor and
+    load turn as one; a simulation from the commands alone would run away, the torque along the motion tells.
+    """
+    free = rig.clamped == frozenset({"housing_end"}) and not rig["spring_end.stiffness"]
+    if rig.rigid_spring or rig.loop is not None or rig.motion != "simulated" or rig.conditions or not free:
+        return rig
+    if not all("position" in r and "deflection" not in r for r in records):
+        return rig
+    if spring_mode(rig) < max(c.rate for r in records for c in r.channels.values() if len(c) > 1):
+        return rig
+    kept = {n: q for n, q in rig.quantities.items() if not n.startswith("spring.")}
+    return replace(rig, quantities=kept, rigid_spring=True)
 
 
 def require_position(record: Record) -> None:
@@ -143,13 +197,17 @@ def motion_from(record: Record, rig: Rig | None = None) -> Motion:
             one = record[n].between(begin, end + 0.5 * step)
             values[part] = smooth(CubicSpline(one.t, one.y)(t[part]), step)
         counts[part] = (t[part] >= t[part][0] + SKIPPED_START) & (t[part] <= t[part][-1] - SKIPPED_START)
+    fine = t
     t, q, v, a, *torques = (np.asarray(values[::finer], np.float64) for values in (t, q, v, a, *torques))
     rate = np.gradient(shown["deflection"], step) if "deflection" in shown else _nothing()
     ft, d = (np.asarray(shown.get(n, _nothing())[::finer], np.float64) for n in ("ft", "deflection"))
-    commanded = "motor_torque" not in record
-    counts = counts[::finer] & ~_reverses(v, period) if beside else counts[::finer]
+    command = _nothing() if "motor_torque" in record else record["command"].held(fine + 0.5 * step)
+    counts = counts[::finer]
+    noise = rig.sensors.get("position", Sensor()).level if rig is not None else 0.0
+    moves = counts & ~_at_rest(np.interp(t, position.t, position.y), noise, period)
+    counts = moves if np.count_nonzero(moves) >= FEWEST else counts
     torque = _likeliest(torques, [a, v, np.sign(v), np.ones(len(t)), ft if len(ft) else d], counts)
-    return Motion(t, q, v, a, torque, counts, commanded, ft, d, np.asarray(rate[::finer]))
+    return Motion(t, q, v, a, torque, counts, command, ft, d, np.asarray(rate[::finer]))
 
 
 def _possible_torques(record: Record, t: FloatArray, is_moved: bool) -> list[FloatArray]:
@@ -183,18 +241,20 @@ _INSTANTS, _FAR_BETTER = 9, 0.5
 """Tried within a sample. Of the power that is left: a torque whose hold is not the log's leaves far more."""
 
 
-def _reverses(v: FloatArray, period: float) -> BoolArray:
-    """Return where a filtered motion is nearly at rest, or was within the filter's reach: a gear that sticks
-    holds by any torque there, which no law of the speed says."""
-    from scipy.ndimage import binary_dilation
+def _at_rest(position: FloatArray, noise: float, period: float) -> BoolArray:
+    """Return where a gear stands still as far as its encoder tells, or did so within the filter's reach.
 
-    slow = np.abs(v) < _NEARLY_AT_REST * float(np.sqrt(np.mean(v**2)))
-    reach = math.ceil(1.0 / (CUT_OFF * period))
-    return np.asarray(binary_dilation(slow, np.ones(2 * reach + 1, bool)), bool)
+    Any torque below its friction holds it there, which no law of the speed says. position: rad, not filtered.
+    """
+    from scipy.ndimage import binary_dilation, maximum_filter1d, minimum_filter1d
+
+    width = 2 * math.ceil(1.0 / (CUT_OFF * period)) + 1
+    travel = maximum_filter1d(position, width) - minimum_filter1d(position, width)
+    return np.asarray(binary_dilation(travel <= _RANGE * noise, np.ones(width, bool)), bool)
 
 
-_NEARLY_AT_REST = 0.02
-"""Of the speed's RMS."""
+_RANGE = 6.0
+"""Sigmas between the highest and the lowest of a hundred readings of one angle."""
 _FILTERED = ("position", "motor_torque", "deflection", "ft")
 _BRIDGED = 0.1
 """s. A shorter silence of a motion is a line, and counts."""
@@ -258,14 +318,58 @@ def smooth(values: FloatArray, period: float) -> FloatArray:
     return np.asarray(filtfilt(*butter(4, min(CUT_OFF * 2.0 * period, 0.8)), values))
 
 
+def noise_along(rig: Rig, motion: Motion) -> dict[str, float]:
+    """Return the RMS of what the noise of all channels leaves between the torques of `motion.judged`, N m.
+
+    A position's noise passes the filter, is differentiated twice, and becomes torque by the rig's inertia.
+    """
+    period = float(motion.t[1] - motion.t[0])
+    h = filtered_noise(period)
+    slow = _behind_corner(h, motion.corner, period)
+    white = {n: motion.white.get(n, 0.0) for n in _FILTERED}
+    own = {"motor_torque": white["motor_torque"] * _rms_sum(slow[0]), "ft": white["ft"] * _rms_sum(h[0])}
+    load = {"motor_torque": 0.0, "ft": 0.0}
+    m = _as_one_part(rig)[1]
+    mass, damping, stiffness = (float(x[0, 0]) for x in (m.mass, m.damping, m.stiffness))
+    if rig.motion == "measured":
+        damping, stiffness = damping - rig["spring.damping"], 0.0
+        d = np.array([rig["spring.stiffness"], rig["spring.damping"], 0.0]) * white["deflection"]
+        d = d if len(motion.d) else np.array([white["ft"], 0.0, 0.0])
+        load = {"motor_torque": _rms_sum(d @ slow), "ft": _rms_sum(d @ h)}
+    moving = np.array([stiffness, damping, mass]) @ slow
+    moved = {"motor_torque": white["position"] * _rms_sum(moving), "ft": 0.0}
+    return {n: math.hypot(own[n], load[n], moved[n]) for n in motion.judged}
+
+
+@lru_cache(maxsize=16)
+def filtered_noise(period: float) -> FloatArray:
+    """Return what one sample of an angle leaves of itself, its rate and its acceleration, shape (3, n).
+
+    At the samples around it; all is linear, so white noise of one sigma leaves the root of the squares' sum.
+    period: s, between samples.
+    """
+    from scipy.interpolate import CubicSpline
+
+    reach = max(FEWEST, math.ceil(SKIPPED_START / period))
+    finer = max(1, math.ceil(period / FINE))
+    one = np.zeros(2 * reach + 1)
+    one[reach] = 1.0
+    at = np.arange(len(one)) * period
+    step = period / finer
+    q = smooth(CubicSpline(at, one)(np.arange(2 * reach * finer + 1) * step), step)
+    v = np.gradient(q, step)
+    return np.array([q, v, np.gradient(v, step)])[:, ::finer]
+
+
+def _rms_sum(values: FloatArray) -> float:
+    return float(np.sqrt(np.sum(values**2)))
+
+
 def torques_along(rig: Rig, motion: Motion) -> dict[str, FloatArray]:
     """Return the torques of `motion.judged` that a motion takes, N m, filtered like the motion."""
     read = ("position", "motor_torque", *(("ft", "deflection") if rig.motion == "measured" else ()))
     check_unfiltered(rig, read, "a rig that is judged along its measured motion")
-    rig_as_is = with_structure(rig)
-    if rig.motion == "measured":
-        rig_as_is = replace(rig_as_is, clamped=frozenset(END_NAMES))
-    m = mechanics(rig_as_is, linear_gravity=False)
+    rig_as_is, m = _as_one_part(rig)
     if m.order != 1 or "housing_end" not in rig.clamped:
         raise IdentificationError(
             f"rig {rig.name}: {m.order} moving parts, expected one on a clamped housing for the inverse model"
@@ -282,7 +386,16 @@ def torques_along(rig: Rig, motion: Motion) -> dict[str, FloatArray]:
         for name, values in (("inertia", motion.a), ("damping", motion.v), ("stiffness", motion.q))
     )
     nothing = np.zeros(len(motion.t))
-    return {"motor_torque": _needed(machine, motion, linear, gravity, load, nothing, nothing, period)[0]}
+    needed = _needed(machine, motion, linear, gravity, load, nothing, nothing, period)[0]
+    return {"motor_torque": motion.compared(needed + _lost_of_command(rig, machine, motion))}
+
+
+def _as_one_part(rig: Rig) -> tuple[Rig, Mechanics]:
+    """Return the rig whose motion is judged, and its equations without gravity; a moved output is held."""
+    rig = with_structure(rig)
+    if rig.motion == "measured":
+        rig = replace(rig, clamped=frozenset(END_NAMES))
+    return rig, mechanics(rig, linear_gravity=False)
 
 
 def _beside_spring(
@@ -297,7 +410,8 @@ def _beside_spring(
     damping = m.damping[0, 0] - rig["spring.damping"]
     linear = m.mass[0, 0] * motion.a + damping * motion.v + load
     torque, shown = _needed(machine, motion, linear, nothing, load, d, rate, period)
-    found = {"motor_torque": torque, "ft": load + smooth(shown - load, period)}
+    torque = torque + _lost_of_command(rig, machine, motion)
+    found = {"motor_torque": motion.compared(torque), "ft": load + smooth(shown - load, period)}
     return {n: found[n] for n in motion.judged}
 
 
@@ -314,7 +428,7 @@ def _needed(
         if np.array_equal(before, added):
             break
         needed = (linear + smooth(gravity - added, period)) / gains
-    return (_undone(machine, motion, needed, period) if motion.commanded else needed), shown
+    return needed, shown
 
 
 def _parts(machine: Machine) -> tuple[Calls, FloatArray, FloatArray]:
@@ -332,14 +446,20 @@ def _as_moved(machine: Machine, motion: Motion, period: float) -> Motion:
     return replace(motion, q=motion.q - error, v=motion.v - v, a=motion.a - np.gradient(v, period))
 
 
-def _undone(machine: Machine, motion: Motion, torque: FloatArray, period: float) -> FloatArray:
-    """Return the command of which its effects make a torque: x + (torque - effects of x), again and again."""
-    if machine.calls.first[_COMMAND] == machine.calls.first[_COMMAND + 1]:
-        return torque
-    command = torque
-    for _ in range(_UNDOINGS):
-        command = command + torque - _command_torque(*_parts(machine), command, motion.v)
-    return smooth(command, period)
+def _lost_of_command(rig: Rig, machine: Machine, motion: Motion) -> FloatArray:
+    """Return what the effects at the command take away from it, N m, filtered like the motion.
+
+    Added to the torque that a motion takes it is the command that the motion takes.
+    """
+    if not len(motion.command) or machine.calls.first[_COMMAND] == machine.calls.first[_COMMAND + 1]:
+        return np.zeros(len(motion.t))
+    period = float(motion.t[1] - motion.t[0])
+    finer = round(len(motion.command) / len(motion.t))
+    fine = build(rig, period / finer, float(motion.t[-1] - motion.t[0]))
+    t = motion.t[0] + (np.arange(len(motion.command)) + 0.5) * period / finer
+    v = np.interp(t, motion.t, motion.v)
+    lost = motion.command - _command_torque(*_parts(fine), motion.command, v)
+    return np.interp(motion.t, t, smooth(lost, period / finer))
 
 
 @njit(cache=True, error_model="numpy")
@@ -355,11 +475,12 @@ def motor_gains(calls, s, effect_x, count):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, error_model="numpy")
 def _command_torque(calls, s, effect_x, command, v):  # type: ignore[no-untyped-def]
-    """Return the torque (N m) after the effects at the command, along a motion."""
+    """Return the mean torque (N m) over each step after the effects at the command, along a motion."""
     torque = np.empty(len(command))
     for k in range(len(command)):
         s[st.TIME], s[st.OUTPUT_VELOCITY] = k * s[st.STEP], v[k]
-        s[st.COMMAND] = s[st.CURRENT] = command[k]
+        s[st.COMMAND] = s[st.CURRENT] = s[st.CURRENT_BEFORE] = s[st.HELD] = command[k]
+        s[st.BEFORE] = s[st.AFTER] = 0.0
         call_port(_COMMAND, calls, s.ctypes.data, calls.p.ctypes.data, effect_x.ctypes.data)
         torque[k] = s[st.COMMAND]
     return torque

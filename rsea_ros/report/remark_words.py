@@ -101,6 +101,8 @@ _WORDS: Mapping[Code, str] = {
     "other_records": "Nothing was fitted to {names}, of which the rig has conditions too.",
     "stretches": "Models were fitted and tested on {v[0]:.0f} s of the {v[1]:.0f} s recorded: on stretches "
     "spread evenly, and on those that the nominal model simulates worst. The data were checked in full.",
+    "unseen_spring": "The mode of rotor and load on the spring, {v[0]:.3g} Hz, lies above the {v[1]:.3g} Hz "
+    "of the record: the spring was taken as rigid, and the torque was judged along the measured motion.",
     "lost_cycles": "{v[0]:.0f} lost cycles of the driver are a likely cause of the misfit: behind them the "
     "motor torque is further from its commands than elsewhere. What is named here may stand in for them: "
     "record again on an idle computer.",

@@ -27,7 +27,7 @@ def test_a_motion_is_the_angle_its_rates_and_the_torque_of_its_instants():
     record = Record({"position": channel(sine(T)[0]), "command": channel(3.0 * np.cos(W * T)),
                      "motor_torque": channel(2.0 * np.cos(W * T))})  # fmt: skip
     motion = inverse.motion_from(record)
-    assert motion.t == pytest.approx(T) and not motion.commanded
+    assert motion.t == pytest.approx(T) and not len(motion.command)
     inside = motion.counts
     assert inside.any() and not inside[0] and not inside[-1]
     margin = T[inside][0]
@@ -37,7 +37,7 @@ def test_a_motion_is_the_angle_its_rates_and_the_torque_of_its_instants():
     assert motion.torque[inside] == pytest.approx(2.0 * np.cos(W * T)[inside], abs=0.01)
     asked = inverse.motion_from(Record({n: record[n] for n in ("position", "command")}))
     held = 3.0 * np.cos(W * (T - 0.005))  # the mean of the holds on either side of a stamp
-    assert asked.commanded and asked.torque[inside] == pytest.approx(held[inside], abs=0.02)
+    assert len(asked.command) and asked.torque[inside] == pytest.approx(held[inside], abs=0.02)
 
 
 def test_a_gap_is_a_line_and_does_not_count_and_what_is_no_number_is_left_out():
@@ -108,7 +108,7 @@ def taken(rig, **changes):
 
 
 def test_the_torque_of_a_motion_is_that_of_the_equation_of_motion():
-    """(J + J_l) q'' + (b + b_l) q' + k_l q + m g l sin(q + q_0), friction against the speed, gains undone."""
+    """(J + J_l) q'' + (b + b_l) q' + k_l q + m g l sin(q + q_0), less friction; gains and limits count."""
     q, v, a = (x[200:-200] for x in sine(T))
     values = {"spring_end.inertia": 0.3, "spring_end.damping": 0.2, "spring_end.stiffness": 4.0,
               "spring_end.gravity": 6.0, "spring_end.gravity_angle": 0.4}  # fmt: skip
@@ -121,6 +121,10 @@ def test_the_torque_of_a_motion_is_that_of_the_equation_of_motion():
     assert np.mean((rubbed - expected) * np.sign(v)) == pytest.approx(2.0, rel=0.1)
     weak = rig.with_effects(EffectSetting("torque_constant_error", {"gain": 0.8}))
     assert taken(weak) == pytest.approx(expected / 0.8, abs=1e-6)
-    assert taken(rig, commanded=True) == pytest.approx(expected, abs=1e-6)
+    command = W * (np.arange(20_000) + 0.5) * 5e-4
+    assert taken(rig, command=command) == pytest.approx(expected, abs=1e-6)
+    limited = rig.with_effects(EffectSetting("torque_saturation", {"limit": 2.0}))
+    lost = inverse.smooth(np.maximum(W * T - 2.0, 0.0), 0.01)[200:-200]
+    assert taken(limited, command=command) == pytest.approx(expected + lost, abs=2e-3)
     with pytest.raises(IdentificationError, match="moving parts, expected one"):
         inverse.torques_along(load_rig("paper_moving_output"), motion())
