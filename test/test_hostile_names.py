@@ -13,14 +13,14 @@ from xml.etree import ElementTree
 
 import pytest
 
-from rsea_ros.cli.fleet import no_formula
+from rsea_extras.cli.fleet import no_formula
+from rsea_extras.exports.feedforward import export_feedforward
+from rsea_extras.exports.fmu import export_fmu
+from rsea_extras.exports.isaac import export_isaac
+from rsea_extras.exports.urdf import export_sdf, export_urdf
 from rsea_ros.effects.effect import Claims
-from rsea_ros.exports.feedforward import export_feedforward
-from rsea_ros.exports.fmu import export_fmu
-from rsea_ros.exports.isaac import export_isaac
 from rsea_ros.exports.mjcf import export_mjcf
 from rsea_ros.exports.others import identifier
-from rsea_ros.exports.urdf import export_sdf, export_urdf
 from rsea_ros.laws.effect_source import LawProvenance, source_of
 from rsea_ros.laws.law import FittedTerm, Law
 from rsea_ros.laws.terms import GEAR_TERMS

@@ -20,7 +20,7 @@ GROUPS = {
     "science": (
         "test/checks", "test/control", "test/design", "test/diagnosis", "test/effects", "test/experiment",
         "test/health", "test/identification", "test/independent", "test/laws", "test/model", "test/paper",
-        "test/trends",
+        "test/extras/trends",
     ),
     "safety": (
         "test/hardware", "test/nodes", "test/cli/test_run_launch_topics.py", "test/test_torque_edge.py",

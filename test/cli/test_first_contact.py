@@ -34,7 +34,7 @@ def test_a_verbs_help_ends_with_an_example_that_its_parser_takes(name, capsys):
     with pytest.raises(SystemExit) as left:
         cli.main([name, "--help"])
     shown = capsys.readouterr().out
-    verb = importlib.import_module(f"rsea_ros.cli.{cli.verbs()[name].stem}")
+    verb = importlib.import_module(cli.verbs()[name])
     assert left.value.code == 0 and shown.rstrip().endswith(verb.EXAMPLE)
     for command in verb.EXAMPLE.split("&&"):
         program, subcommand, *arguments = shlex.split(command)

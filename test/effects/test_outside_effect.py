@@ -11,6 +11,8 @@ import pytest
 from effect_bench import RIG, command
 from similar_machine import record_with
 
+from rsea_extras.exports.bam import export_bam
+from rsea_extras.exports.urdf import export_urdf
 from rsea_ros.control.compensation import compensation
 from rsea_ros.control.law import responses, sample_rig
 from rsea_ros.control.uncertainty import lag_responses
@@ -19,9 +21,7 @@ from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.diagnosis.naming.conclusion import undetermined_play
 from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.effects.catalogue import catalogue, effect_named
-from rsea_ros.exports.bam import export_bam
 from rsea_ros.exports.mjcf import export_mjcf
-from rsea_ros.exports.urdf import export_urdf
 from rsea_ros.identification.fit import unknowns_of
 from rsea_ros.identification.identify import identify
 from rsea_ros.identification.problem import Problem, case_from
