@@ -8,8 +8,8 @@ from graphlib import TopologicalSorter
 from import_graph import MODULES, ROOT, imports, name_of, nodes, tree_of
 
 LINES, FILES, SMALL, LOOSE = 63_706, 370, 22, 8
-"""At most: gross lines and files of rsea_ros and msg_adapters, files of up to 30 code lines (effects apart, and
-extension, which lists names), files at the root of rsea_ros. They may fall. What raises one needs a decision
+"""At most: gross lines and files of rsea_ros and msg_adapters, files of up to 30 code lines (effects and
+extension apart), files at the root of rsea_ros. They may fall. What raises one needs a decision
 that says what went for it."""
 IMPORT_SHARE = 0.0648
 """Of all lines, at most; extension apart, which only imports."""

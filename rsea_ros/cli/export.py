@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
@@ -100,23 +100,23 @@ def _export(target: str, rig: Rig, args: argparse.Namespace) -> Export:
         options = {"actuator": args.actuator}
     elif target == "feedforward":
         options = _measured(args.feedforward, rig) | {"suffix": args.out.suffix if args.out else ""}
-    module, _, function = place(target).partition(":")
-    made: Export = getattr(import_module(module), function)(rig, **options)
+    made: Export = exporter(target)(rig, **options)
     return made
 
 
 def abouts() -> dict[str, str]:
-    """Return what each target is, by name; of another package's where it is."""
+    """Return what each target is, by name; those that other packages register included."""
     return ABOUT | {n: f"target of {at}" for n, at in installed(TARGETS).items() if n not in ABOUT}
 
 
-def place(target: str) -> str:
-    """Return the module and the function of a target. Raises ParameterError for one that is not installed."""
-    if target == "mjcf":
-        return "rsea_ros.exports.mjcf:export_mjcf"
-    if not (registered_at := registered(TARGETS, target)):
+def exporter(target: str) -> Callable[..., Any]:
+    """Return the function that makes a target of a rig. Raises ParameterError where it is not installed."""
+    place = "rsea_ros.exports.mjcf:export_mjcf" if target == "mjcf" else registered(TARGETS, target)
+    if not place:
         raise not_installed(f"--{target}")
-    return registered_at
+    module, _, name = place.partition(":")
+    function: Callable[..., Any] = getattr(import_module(module), name)
+    return function
 
 
 def _measured(source: str, rig: Rig) -> dict[str, Any]:
@@ -177,7 +177,7 @@ def _lines(made: Export, rig: Rig, out: Path, verified: Verification) -> list[st
     """Return the report as text: file, content, omissions and what they cost, differences."""
     from rsea_ros.exports.others import coverage_lines
 
-    lines = [f"{out}: {abouts()[made.target]}, of {rig.name}"]
+    lines = [f"{out}: {ABOUT.get(made.target, made.target)}, of {rig.name}"]
     lines += [f"  {line}" for line in coverage_lines(made.says, made.leaves_out)]
     lines += [f"  without {name}: {_apart(one)}" for name, one in verified.losses.items()]
     lines += [f"played in both: {_apart(one)}" for one in verified.differences]

@@ -9,7 +9,7 @@ import pytest
 
 from rsea_ros import plugins
 from rsea_ros.cli import main as cli
-from rsea_ros.cli.export import abouts, place
+from rsea_ros.cli.export import abouts, exporter
 
 MISSING = "rsea_extras: not installed, expected for"
 INSTALL = "pip install . in the source of rsea_ros\n"
@@ -74,7 +74,7 @@ def test_no_package_replaces_a_verb_of_this_one(other):
 
 
 def test_a_target_of_another_package_is_offered(other):
-    assert abouts()["clay"] == "target of greeting:run" and place("clay") == "greeting:run"
+    assert abouts()["clay"] == "target of greeting:run" and exporter("clay").__module__ == "greeting"
 
 
 def test_entry_points_are_read_as_importlib_reads_them(other):

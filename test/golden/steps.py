@@ -20,7 +20,7 @@ from written import rounded, short, sums, text_of
 
 import rsea_ros as rsea
 from rsea_extras.pages.page import write_fleet_report
-from rsea_ros.cli.export import place as exporter
+from rsea_ros.cli.export import exporter
 from rsea_ros.cli.main import verbs
 from rsea_ros.diagnosis.settings import DEFAULT
 from rsea_ros.effects.catalogue import catalogue
@@ -274,11 +274,11 @@ def exports(folder: Path) -> Iterator[str]:
     for name in catalogue():
         rigs[name] = (rigs["pendulum"] if name == "gravity_error" else base).with_effect(name)
     for target in ("mjcf", "urdf", "sdf", "isaac", "bam", "feedforward"):
-        module, _, function = exporter(target).partition(":")
+        export = exporter(target)
         seen = set[str]()
         for name, rig in rigs.items():
             try:
-                made = getattr(importlib.import_module(module), function)(rig)
+                made = export(rig)
             except RseaError as error:
                 yield f"{target} of {name}: {error}"
                 continue
