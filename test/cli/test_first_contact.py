@@ -23,7 +23,7 @@ def test_a_table_given_for_a_bag_is_sent_to_import(tmp_path, refused):
     assert f"rsea import {tmp_path}/run.csv --map MAP" in refused("diagnose", tmp_path / "run.csv")
 
 
-@pytest.mark.parametrize("words", ["identify x", "diagnose x", "export --mjcf x", "watch"])
+@pytest.mark.parametrize("words", ["identify x", "diagnose x", "export --mjcf x"])
 def test_an_empty_name_is_no_folder(words, refused):
     """It was the working directory, where the results were written."""
     assert "'', expected a name" in refused(*words.split(), "--out", "")

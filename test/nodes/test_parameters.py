@@ -104,7 +104,7 @@ def signals():
             signal.signal(number, action)
 
 
-@pytest.mark.parametrize("name", sorted(WRONG.keys() - set(PROCESSES)))
+@pytest.mark.parametrize("name", sorted((WRONG.keys() & NODES.keys()) - set(PROCESSES)))
 def test_every_node_refuses_what_is_wrong_in_one_line_with_status_2(name, signals, monkeypatch, capfd):
     words = [w for key, value in WRONG[name][0].items() for w in ("-p", f"{key}:={as_argument(value)}")]
     monkeypatch.setattr(sys, "argv", [name, "--ros-args", *words])
