@@ -70,7 +70,7 @@ PUBLIC = {
     "rsea_ros.extension.node": "parameters, clock and health of a node, and its message types",
     "rsea_ros.extension.target": "what an export states of a rig, from the equations that the simulation has",
 }
-"""What rsea_extras may import of rsea_ros, with the reason (that it needs all: test/extras/test_registered)."""
+"""What rsea_extras may import of rsea_ros, with the reason; test/extras/test_registered.py: it needs all."""
 
 NUMERIC = {"numpy", "scipy", "control", "numba", "llvmlite"}
 MESSAGES = {
