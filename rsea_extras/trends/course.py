@@ -54,6 +54,12 @@ class Regression:
         """Return the weighted sum of squares of the residual, the prior's part included."""
         return float(np.sum(self.w * self.y**2) - self.coefficients @ (self.x.T @ (self.w * self.y)))
 
+    def combine(self, row: FloatArray) -> Interval:
+        """Return a linear combination of b with its interval. row: shape (p,)."""
+        variance = float(row @ self.covariance @ row)
+        value, half = float(row @ self.coefficients), Z95 * float(np.sqrt(max(0.0, variance)))
+        return Interval(value, value - half, value + half)
+
     def with_columns(self, columns: FloatArray) -> Regression:
         """Return the regression with further columns, shape (n, k), without a prior."""
         more = np.concatenate([self.precision, np.zeros(columns.shape[1])])
@@ -136,6 +142,35 @@ class Course:
         r = self.regression()
         return np.asarray(r.x[:, self.at :] @ r.coefficients[self.at :])
 
+    def level_row(self, t: float) -> FloatArray:
+        """Return the combination of coefficients that is the level at a time, days from the first on."""
+        terms = [float(term(k.kind, np.array([t]), self.t[k.index])[0]) for k in self.terms]
+        return np.array([1.0, *[0.0] * (self.at - 1), *([t] if self.slope else []), *terms])
+
+    def slope_row(self, last: int) -> FloatArray:
+        """Return the combination of coefficients that is the slope after the ramps up to a term's place."""
+        ramps = [float(k.kind == "ramp" and i <= last) for i, k in enumerate(self.terms)]
+        return np.array([*[0.0] * self.at, *([1.0] if self.slope else []), *ramps])
+
+    def level(self, t: float) -> Interval:
+        """Return the level at a time, days from the first on, at the mean temperature."""
+        return self.regression().combine(self.level_row(t))
+
+    def slope_after(self, last: int) -> Interval:
+        """Return the slope, per day, after the ramps up to a place; -1: before all."""
+        return self.regression().combine(self.slope_row(last))
+
+    def step_size(self, i: int) -> Interval:
+        """Return the size of the step at a term's place."""
+        first = self.at + self.slope
+        return self.regression().combine(np.eye(first + len(self.terms))[first + i])
+
+    def ramp_size(self, last: int) -> Interval:
+        """Return the change that a ramp adds until the next one or the end; -1: the first slope."""
+        begin = self.t[self.terms[last].index] if last >= 0 else 0.0
+        later = [self.t[k.index] for k in self.terms[last + 1 :] if k.kind == "ramp"]
+        return self.slope_after(last).times(float(min([*later, self.t[-1]]) - begin))
+
 
 def course_of(days: Days, day_variance: float, prior: tuple[float, float]) -> Course:
     """Return the course without a change. prior: mean and sd of the temperature slope, per K, relative."""
@@ -200,7 +235,6 @@ def allowed_gains(gain: FloatArray, taken: Sequence[int], fewest: int) -> FloatA
 
 _SURE_SLOPE = 3.0
 """|z| of a slope from which it is a trend: one in 370, of a series that is more than noise."""
-Quantity = Callable[[Course], Interval]
 
 
 @dataclass(frozen=True)
@@ -211,10 +245,11 @@ class Dated:
     ranges: tuple[tuple[int, int], ...]
     moved: tuple[tuple[Course, ...], ...]
 
-    def interval(self, of: Quantity) -> Interval:
-        """Return a quantity of the course; its interval spans the dates too, in quadrature."""
-        best = of(self.course)
-        apart = [[of(c).value - best.value for c in pair] for pair in self.moved]
+    def interval(self, of: Callable[..., Interval], *at: float) -> Interval:
+        """Return a quantity of the course, such as Course.level at a time; its interval spans the dates too,
+        in quadrature."""
+        best = of(self.course, *at)
+        apart = [[of(c, *at).value - best.value for c in pair] for pair in self.moved]
         below = np.sqrt((best.value - best.low) ** 2 + sum(min(0.0, *pair) ** 2 for pair in apart))
         above = np.sqrt((best.high - best.value) ** 2 + sum(max(0.0, *pair) ** 2 for pair in apart))
         return Interval(best.value, best.value - float(below), best.value + float(above))
@@ -232,71 +267,16 @@ def date_course(course: Course, doubt: float) -> Dated:
     return Dated(course, tuple(ranges), tuple(moved))
 
 
-def combine(r: Regression, row: FloatArray) -> Interval:
-    """Return a linear combination of the coefficients with its interval."""
-    variance = float(row @ r.covariance @ row)
-    value, half = float(row @ r.coefficients), Z95 * float(np.sqrt(max(0.0, variance)))
-    return Interval(value, value - half, value + half)
-
-
-def level_at(t: float) -> Quantity:
-    """Return the quantity that is the level at a time, at the mean temperature. t: days from the first on."""
-    return lambda course: combine(course.regression(), level_row(course, t))
-
-
-def level_row(course: Course, t: float) -> FloatArray:
-    """Return the combination of coefficients that is the level at a time."""
-    at = np.array([t])
-    terms = [float(term(k.kind, at, course.t[k.index])[0]) for k in course.terms]
-    return np.array([1.0, *[0.0] * (course.at - 1), *([t] if course.slope else []), *terms])
-
-
-def slope_row(course: Course, last: int) -> FloatArray:
-    """Return the combination of coefficients that is the slope after the ramps up to a term's place."""
-    row = np.zeros(course.at + course.slope + len(course.terms))
-    row[course.at : course.at + course.slope] = 1.0
-    for i, k in enumerate(course.terms[: last + 1]):
-        row[course.at + course.slope + i] = float(k.kind == "ramp")
-    return row
-
-
-def slope_after(last: int) -> Quantity:
-    """Return the quantity that is the slope, per day, after the ramps up to a place; -1: before all."""
-    return lambda course: combine(course.regression(), slope_row(course, last))
-
-
-def step_size(i: int) -> Quantity:
-    """Return the quantity that is the size of the step at a term's place."""
-
-    def size(course: Course) -> Interval:
-        first = course.at + course.slope
-        return combine(course.regression(), np.eye(first + len(course.terms))[first + i])
-
-    return size
-
-
-def ramp_size(last: int) -> Quantity:
-    """Return the change that a ramp adds until the next one or the end; -1: the first slope."""
-
-    def size(course: Course) -> Interval:
-        begin = course.t[course.terms[last].index] if last >= 0 else 0.0
-        later = [course.t[k.index] for k in course.terms[last + 1 :] if k.kind == "ramp"]
-        length = float(min([*later, course.t[-1]]) - begin)
-        return slope_after(last)(course).times(length)
-
-    return size
-
-
 def last_slope(whole: Dated) -> Interval:
     """Return the slope of the last piece, per day, also where it is not part of the course."""
     course = whole.course
     if course.slope or any(k.kind == "ramp" for k in course.terms):
-        return whole.interval(slope_after(len(course.terms) - 1))
+        return whole.interval(Course.slope_after, len(course.terms) - 1)
     start = max((k.index for k in course.terms), default=0)
     if len(course.t) - start < 3 or course.t[-1] <= course.t[start]:
         return Interval(0.0, -np.inf, np.inf)
     longer = replace(course, terms=(*course.terms, StepOrRamp("ramp", start)))
-    return step_size(len(course.terms))(longer)
+    return longer.step_size(len(course.terms))
 
 
 def is_sure(slope: Interval) -> bool:
@@ -324,7 +304,7 @@ def time_to_limit(whole: Dated, limit: float) -> Interval | None:
 def _ahead(course: Course, limit: float) -> Interval | None:
     """Return days from the last one on."""
     r, c = course.regression(), course.regression().covariance
-    a, b = level_row(course, float(course.t[-1])), slope_row(course, len(course.terms) - 1)
+    a, b = course.level_row(float(course.t[-1])), course.slope_row(len(course.terms) - 1)
     level, slope = float(a @ r.coefficients) - limit, float(b @ r.coefficients)
     square = slope**2 - Z95**2 * float(b @ c @ b)
     half = level * slope - Z95**2 * float(a @ c @ b)

@@ -8,9 +8,10 @@ from scipy.stats import t as student
 
 from rsea_extras.trends import course as courses, series as ts
 from rsea_extras.trends.appearing import adjust, appearances, scan_threshold
+from rsea_extras.trends.course import Course, Dated
 from rsea_extras.trends.course_search import Tested, change_test, describe, end_share
 from rsea_extras.trends.days import DayEffect, Days, day_effect, day_means, fleet_prior
-from rsea_extras.trends.result import Alarm, Change, FleetTrends, Interval, ParameterCourse, Trend
+from rsea_extras.trends.result import Alarm, Change, FleetTrends, Interval, ParameterCourse, State, Trend
 from rsea_ros.extension.base import MAD_TO_SD, Z95
 
 _POINTS = 24
@@ -18,44 +19,35 @@ _POINTS = 24
 
 
 def trend_of(
-    series: ts.Series, test: Tested, course: courses.Course, q: float, settings: ts.TrendSettings
+    series: ts.Series, test: Tested, course: Course, q: float, settings: ts.TrendSettings
 ) -> Trend:
     """Return the trend of a course. course: the one without a change for a series that is noise."""
     scale, whole = course.days.scale, courses.date_course(course, settings.date_doubt)
     detectable = scale * _detectable(course, test.effect.freedom, settings)
-    ends = (courses.level_at(float(t)) for t in (course.t[0], course.t[-1]))
-    first, now = (whole.interval(level).times(scale) for level in ends)
+    ends = (float(course.t[0]), float(course.t[-1]))
+    first, now = (whole.interval(Course.level, t).times(scale) for t in ends)
     level = abs(now.value)
     if detectable > settings.widest * level and not course.terms:
         reason = f"only steps above {detectable / level:.0%} would show" if level else "no level"
         return Trend(series, "undetermined", reason=reason, detectable=detectable)
     changes, slope = tuple(_changes(series, whole)), courses.last_slope(whole)
     goes_on = bool(changes) and changes[-1].kind == "ramp" and courses.is_sure(slope)
+    state: State = "trending" if goes_on else "changed" if changes else "steady"
     trend = Trend(
-        series,
-        "trending" if goes_on else "changed" if changes else "steady",
-        q,
-        first,
-        now,
-        per_year=slope.times(scale * ts.YEAR),
-        day_sd=scale * float(np.sqrt(course.day_variance)),
-        detectable=detectable,
-        changes=changes,
-        curve=_curve(course),
-        by_day=_by_day(course),
-        per_kelvin=_per_kelvin(course),
-    )
+        series, state, q, first, now, slope.times(scale * ts.YEAR), _per_kelvin(course),
+        scale * float(np.sqrt(course.day_variance)), detectable, changes, _curve(course), _by_day(course),
+    )  # fmt: skip
     return _with_limit(trend, whole, settings) if goes_on else trend
 
 
-def _per_kelvin(course: courses.Course) -> Interval | None:
+def _per_kelvin(course: Course) -> Interval | None:
     if course.days.warmth is None:
         return None
     r = course.regression()
-    return Interval(*(v + course.warm for v in courses.combine(r, np.eye(r.x.shape[1])[1])))
+    return Interval(*(v + course.warm for v in r.combine(np.eye(r.x.shape[1])[1])))
 
 
-def _detectable(course: courses.Course, freedom: int, settings: ts.TrendSettings) -> float:
+def _detectable(course: Course, freedom: int, settings: ts.TrendSettings) -> float:
     """Return the least step at mid-series that would stand out, relative to the scale."""
     t = course.t
     longer = course.base.with_columns(courses.term("step", t, t[len(t) // 2])[:, None])
@@ -63,20 +55,20 @@ def _detectable(course: courses.Course, freedom: int, settings: ts.TrendSettings
     return b * float(np.sqrt(longer.covariance[-1, -1]))
 
 
-def _changes(series: ts.Series, whole: courses.Dated) -> Iterator[Change]:
+def _changes(series: ts.Series, whole: Dated) -> Iterator[Change]:
     """Yield the steps, and the ramps from their beginning; the end of a ramp is not a separate change."""
     course, scale = whole.course, whole.course.days.scale
-    if course.slope and courses.is_sure(whole.interval(courses.slope_after(-1))):
+    if course.slope and courses.is_sure(whole.interval(Course.slope_after, -1)):
         t = float(course.days.t[0]) * ts.DAY
-        yield Change("ramp", t, t, t, whole.interval(courses.ramp_size(-1)).times(scale), True)
+        yield Change("ramp", t, t, t, whole.interval(Course.ramp_size, -1).times(scale), True)
     for i, k in enumerate(course.terms):
         if k.kind == "step":
-            yield _change(series, whole, i, whole.interval(courses.step_size(i)).times(scale))
-        elif courses.is_sure(whole.interval(courses.slope_after(i))):
-            yield _change(series, whole, i, whole.interval(courses.ramp_size(i)).times(scale))
+            yield _change(series, whole, i, whole.interval(Course.step_size, i).times(scale))
+        elif courses.is_sure(whole.interval(Course.slope_after, i)):
+            yield _change(series, whole, i, whole.interval(Course.ramp_size, i).times(scale))
 
 
-def _change(series: ts.Series, whole: courses.Dated, i: int, size: Interval) -> Change:
+def _change(series: ts.Series, whole: Dated, i: int, size: Interval) -> Change:
     """Return a change; a step lies between the day that shows it first and the one before."""
     t, k, (first, last) = whole.course.days.t, whole.course.terms[i], whole.ranges[i]
     before = max(0, k.index - 1) if k.kind == "step" else k.index
@@ -86,17 +78,17 @@ def _change(series: ts.Series, whole: courses.Dated, i: int, size: Interval) -> 
     return Change(k.kind, since, earliest, latest, size, False, min(row, len(series.time_s) - 1))
 
 
-def _curve(course: courses.Course) -> ParameterCourse:
+def _curve(course: Course) -> ParameterCourse:
     """Return the course at few places: an even grid and both sides of each term's beginning."""
     t, r = course.t, course.regression()
     edges = [v for k in course.terms for v in (t[k.index] - 1e-6, t[k.index])]
     grid = np.unique(np.concatenate([np.linspace(t[0], t[-1], _POINTS), edges]))
-    levels = [courses.combine(r, courses.level_row(course, float(at))) for at in grid]
+    levels = [r.combine(course.level_row(float(at))) for at in grid]
     values = np.array(levels) * course.days.scale
     return ParameterCourse((course.days.t[0] + grid) * ts.DAY, values[:, 0], values[:, 1], values[:, 2])
 
 
-def _by_day(course: courses.Course) -> ParameterCourse:
+def _by_day(course: Course) -> ParameterCourse:
     """Return the days' means without the effect of temperature."""
     days, r = course.days, course.regression()
     value = (course.base.y - r.x[:, 1 : course.at] @ r.coefficients[1 : course.at]) * days.scale
@@ -104,7 +96,7 @@ def _by_day(course: courses.Course) -> ParameterCourse:
     return ParameterCourse(days.t * ts.DAY, value, value - half, value + half)
 
 
-def _with_limit(trend: Trend, whole: courses.Dated, settings: ts.TrendSettings) -> Trend:
+def _with_limit(trend: Trend, whole: Dated, settings: ts.TrendSettings) -> Trend:
     """Return the trend with its limit in the direction of its slope, and the date of reaching it."""
     assert trend.first is not None and trend.per_year is not None
     side = abs(trend.first.value) * settings.limit
@@ -171,17 +163,12 @@ def fleet_trends(
     of_parameters = {(s.joint, s.parameter): trends[s.joint, s.parameter] for s in parameters}
     of_causes = {(s.joint, s.parameter): trends[s.joint, s.parameter] for s in sized}
     joints = len({n.joint for n in every} | {s.joint for s in parameters})
-    return FleetTrends(
-        of_parameters,
-        of_causes,
-        tuple(every),
-        tuple(appearances(every, joints, recordings, of_causes, settings)),
-        outliers(of_parameters.values(), settings),
-        settings.false_discovery,
-        sum(t.state != "undetermined" for t in trends.values()),
-        priors,
-        tuple(sorted({str(j) for j in (*recordings["joint"], *history["joint"])})),
-    )
+    new = tuple(appearances(every, joints, recordings, of_causes, settings))
+    unlike = outliers(of_parameters.values(), settings)
+    tests = sum(t.state != "undetermined" for t in trends.values())
+    names = tuple(sorted({str(j) for j in (*recordings["joint"], *history["joint"])}))
+    rate = settings.false_discovery
+    return FleetTrends(of_parameters, of_causes, tuple(every), new, unlike, rate, tests, priors, names)
 
 
 def _trends(

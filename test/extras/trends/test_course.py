@@ -7,25 +7,16 @@ from itertools import combinations
 import numpy as np
 import pytest
 
+from rsea_extras.trends import course as courses
 from rsea_extras.trends.course import (
     Course,
     Dated,
     Regression,
     StepOrRamp,
-    allowed_gains,
-    cost,
     course_of,
     date_course,
-    improve,
-    is_sure,
-    last_slope,
-    level_at,
-    ramp_size,
     refine,
     scan,
-    slope_after,
-    step_size,
-    time_to_limit,
 )
 from rsea_extras.trends.course_search import breaks
 from rsea_extras.trends.days import Days
@@ -110,45 +101,45 @@ def test_levels_slopes_sizes_and_their_intervals_are_those_of_least_squares() ->
             (given.value, given.low, given.high), row @ b + np.array([0.0, -half, half]), rtol=1e-5
         )
 
-    expect(level_at(t[0])(course), [1, 0, 0])
-    expect(level_at(t[12])(course), [1, 1, 0])
-    expect(level_at(t[-1] + 5.0)(course), [1, 1, t[-1] + 5.0 - t[25]])
-    expect(step_size(0)(course), [0, 1, 0])
-    expect(step_size(1)(course), [0, 0, 1])
-    expect(slope_after(1)(course), [0, 0, 1])
-    expect(ramp_size(1)(course), [0, 0, 1], t[-1] - t[25])
-    assert slope_after(0)(course) == Interval(0.0, 0.0, 0.0)
+    expect(course.level(t[0]), [1, 0, 0])
+    expect(course.level(t[12]), [1, 1, 0])
+    expect(course.level(t[-1] + 5.0), [1, 1, t[-1] + 5.0 - t[25]])
+    expect(course.step_size(0), [0, 1, 0])
+    expect(course.step_size(1), [0, 0, 1])
+    expect(course.slope_after(1), [0, 0, 1])
+    expect(course.ramp_size(1), [0, 0, 1], t[-1] - t[25])
+    assert course.slope_after(0) == Interval(0.0, 0.0, 0.0)
     np.testing.assert_allclose(course.fit_values(), x[:, 1:] @ b[1:], atol=1e-9)
-    assert cost(course, 7.0) == pytest.approx(np.sum((y - x @ b) ** 2) / 1e-4 + 14.0)
+    assert courses.cost(course, 7.0) == pytest.approx(np.sum((y - x @ b) ** 2) / 1e-4 + 14.0)
 
     later = StepOrRamp("ramp", 30)
     sloped = Course(course.days, course.base, 0.0, slope=True, terms=(StepOrRamp("ramp", 10), later))
     x = columns(sloped)
     covariance, b = np.linalg.inv(x.T @ x) * 1e-4, np.linalg.lstsq(x, y, rcond=None)[0]
-    expect(slope_after(-1)(sloped), [0, 1, 0, 0])
-    expect(slope_after(0)(sloped), [0, 1, 1, 0])
-    expect(ramp_size(-1)(sloped), [0, 1, 0, 0], t[10])
-    expect(ramp_size(0)(sloped), [0, 1, 1, 0], t[30] - t[10])
-    expect(last_slope(Dated(sloped, (), ())), [0, 1, 1, 1])
-    assert cost(sloped, 7.0) == pytest.approx(np.sum((y - x @ b) ** 2) / 1e-4 + 2.6 * 7.0)
+    expect(sloped.slope_after(-1), [0, 1, 0, 0])
+    expect(sloped.slope_after(0), [0, 1, 1, 0])
+    expect(sloped.ramp_size(-1), [0, 1, 0, 0], t[10])
+    expect(sloped.ramp_size(0), [0, 1, 1, 0], t[30] - t[10])
+    expect(courses.last_slope(Dated(sloped, (), ())), [0, 1, 1, 1])
+    assert courses.cost(sloped, 7.0) == pytest.approx(np.sum((y - x @ b) ** 2) / 1e-4 + 2.6 * 7.0)
 
 
 def test_a_last_piece_without_a_slope_is_asked_for_one() -> None:
     steps = Course(*(getattr(bent(0.01), n) for n in ("days", "base")), 0.0, terms=(STEP,))
     x = np.column_stack([columns(steps), np.maximum(steps.t - steps.t[12], 0.0)])
     b = np.linalg.lstsq(x, steps.days.y, rcond=None)[0]
-    assert last_slope(Dated(steps, (), ())).value == pytest.approx(b[-1])
+    assert courses.last_slope(Dated(steps, (), ())).value == pytest.approx(b[-1])
     for at, is_asked in ((N - 3, True), (N - 2, False)):
         short = Course(steps.days, steps.base, 0.0, terms=(StepOrRamp("step", at),))
-        assert np.isfinite(last_slope(Dated(short, (), ())).low) == is_asked
+        assert np.isfinite(courses.last_slope(Dated(short, (), ())).low) == is_asked
     flat = course_of(days_of(np.ones(2)), 0.0, (0.0, 1.0))
-    assert last_slope(Dated(flat, (), ())) == Interval(0.0, -np.inf, np.inf)
+    assert courses.last_slope(Dated(flat, (), ())) == Interval(0.0, -np.inf, np.inf)
 
 
 def test_gains_are_allowed_away_from_ends_and_terms() -> None:
-    allowed = allowed_gains(np.ones(20), [10], 3)
+    allowed = courses.allowed_gains(np.ones(20), [10], 3)
     assert np.flatnonzero(allowed == 1.0).tolist() == [3, 4, 5, 6, 7, 13, 14, 15, 16, 17]
-    assert np.flatnonzero(allowed_gains(np.ones(8), [1], 2) == -1.0).tolist() == [0, 1, 2, 7]
+    assert np.flatnonzero(courses.allowed_gains(np.ones(8), [1], 2) == -1.0).tolist() == [0, 1, 2, 7]
 
 
 def test_terms_are_moved_to_their_best_days_in_order_and_too_many_are_left_out() -> None:
@@ -159,9 +150,9 @@ def test_terms_are_moved_to_their_best_days_in_order_and_too_many_are_left_out()
     first, second = (k.index for k in refine(near, 3).terms)
     assert first == 12 and second - first >= 3
     ramp = Course(exact.days, exact.base, 0.0, slope=True, terms=(StepOrRamp("ramp", 12), RAMP, STEP))
-    assert improve(ramp, 20.0, 3).terms == (STEP, RAMP) and not improve(ramp, 20.0, 3).slope
+    assert courses.improve(ramp, 20.0, 3).terms == (STEP, RAMP) and not courses.improve(ramp, 20.0, 3).slope
     turned = Course(exact.days, exact.base, 0.0, terms=(StepOrRamp("ramp", 12), RAMP))
-    assert improve(turned, 20.0, 3).terms == (STEP, RAMP)
+    assert courses.improve(turned, 20.0, 3).terms == (STEP, RAMP)
 
 
 def test_dates_are_as_sure_as_the_likelihood_and_widen_intervals() -> None:
@@ -175,8 +166,8 @@ def test_dates_are_as_sure_as_the_likelihood_and_widen_intervals() -> None:
         likely = 1 + np.flatnonzero(np.array(losses) <= losses[at.terms[i].index - 1] + 3.84)
         assert (first, last) == (likely[0], likely[-1]) and last > first
         assert [c.terms[i].index for c in dated.moved[i]] == [first, last]
-    best, whole = step_size(0)(at), dated.interval(step_size(0))
-    apart = np.array([[step_size(0)(c).value - best.value for c in pair] for pair in dated.moved])
+    best, whole = at.step_size(0), dated.interval(Course.step_size, 0)
+    apart = np.array([[c.step_size(0).value - best.value for c in pair] for pair in dated.moved])
     below = np.hypot(best.value - best.low, np.linalg.norm(np.minimum(apart.min(axis=1), 0.0)))
     above = np.hypot(best.high - best.value, np.linalg.norm(np.maximum(apart.max(axis=1), 0.0)))
     assert whole == pytest.approx((best.value, best.value - below, best.value + above))
@@ -186,7 +177,7 @@ def test_a_limit_is_reached_where_the_line_may_meet_it() -> None:
     """Fieller: at both ends of the interval the line is 1.96 of its own standard deviations off the limit."""
     course = bent(noise=0.01)
     alone = Dated(course, (), ())
-    reached = time_to_limit(alone, 4.0)
+    reached = courses.time_to_limit(alone, 4.0)
     assert reached is not None
     x = columns(course)
     covariance = np.linalg.inv(x.T @ x) * 1e-4
@@ -194,19 +185,19 @@ def test_a_limit_is_reached_where_the_line_may_meet_it() -> None:
     rows = [np.array([1.0, 1.0, when / 86400.0 - FIRST - course.t[25]]) for when in reached]
     off = [(row @ b - 4.0) / np.sqrt(row @ covariance @ row) for row in rows]
     assert off == pytest.approx([0.0, -1.959964, 1.959964], abs=1e-4)
-    assert time_to_limit(alone, 1.0) is None
+    assert courses.time_to_limit(alone, 1.0) is None
     flat = course_of(days_of(1.0 + 0.01 * np.random.default_rng(2).standard_normal(N)), 0.0, (0.0, 1.0))
     sloped = Course(flat.days, flat.base, 0.0, slope=True)
-    assert time_to_limit(Dated(sloped, (), ()), 4.0) is None
-    assert time_to_limit(Dated(course, ((0, 0),), ((course, sloped),)), 4.0) is None
-    both = time_to_limit(Dated(course, ((12, 12),), ((course, course),)), 4.0)
+    assert courses.time_to_limit(Dated(sloped, (), ()), 4.0) is None
+    assert courses.time_to_limit(Dated(course, ((0, 0),), ((course, sloped),)), 4.0) is None
+    both = courses.time_to_limit(Dated(course, ((12, 12),), ((course, course),)), 4.0)
     assert both == pytest.approx(reached)
 
 
 @pytest.mark.parametrize(("value", "sure"), [(3.01, True), (2.99, False), (-3.01, True), (-2.99, False)])
 def test_a_slope_of_three_standard_deviations_is_sure(value, sure) -> None:
     side, other = (1.959964, 50.0) if value > 0.0 else (50.0, 1.959964)
-    assert is_sure(Interval(value, value - side, value + other)) == sure
+    assert courses.is_sure(Interval(value, value - side, value + other)) == sure
 
 
 @pytest.mark.parametrize("piece", ["level", "line"])
