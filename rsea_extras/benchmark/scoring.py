@@ -123,12 +123,8 @@ def score(answers: Mapping[str, Answer], truths: Mapping[str, RecordTruth], effe
     counts = [_counts(answers[name], truth, effects) for name, truth in truths.items()]
     return Scores(
         named_right=_interval(counts, lambda c: _share([x.right for x in c], [x.hidden for x in c])),
-        false_names=_interval(
-            counts, lambda c: _share([x.names - x.right for x in c], [x.names for x in c])
-        ),
-        silent=_interval(
-            counts, lambda c: _share([x.empty and not x.names for x in c], [x.empty for x in c])
-        ),
+        false_names=_interval(counts, lambda c: _share([x.names - x.right for x in c], [x.names for x in c])),
+        silent=_interval(counts, _silent_share),
         brier=_interval(counts, lambda c: float(np.mean([x.brier for x in c]))),
         rank=_interval(counts, _median_rank),
         answered=sum(c.names > 0 for c in counts) / len(counts),
@@ -152,6 +148,10 @@ def _rank(probability: float, others: FloatArray) -> float:
 
 def _share(part: Sequence[float], whole: Sequence[float]) -> float:
     return sum(part) / sum(whole) if sum(whole) else float("nan")
+
+
+def _silent_share(counts: Sequence[_Counts]) -> float:
+    return _share([c.empty and not c.names for c in counts], [c.empty for c in counts])
 
 
 def _median_rank(counts: Sequence[_Counts]) -> float:

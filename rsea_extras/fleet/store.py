@@ -147,8 +147,7 @@ def compact(folder: Path, *, loose: bool = False) -> None:
     _remove(folder, names)
 
 
-def take_out(file: Path, outcomes: Collection[str]) -> None:
-    """Take the rows with some outcomes out of a file. Raises OSError."""
+def _take_out(file: Path, outcomes: Collection[str]) -> None:
     table = read(file)
     kept = table.filter(pc.invert(pc.is_in(table["outcome"], pa.array(sorted(outcomes), pa.string()))))
     if kept.num_rows == 0:
@@ -255,7 +254,7 @@ class Store:
     def take_out(self, outcomes: Collection[str]) -> None:
         """Take the rows with some outcomes out, so that their recordings count as new."""
         for file in self._files():
-            take_out(file, outcomes)
+            _take_out(file, outcomes)
 
     def compact(self) -> None:
         for folder in sorted(self.rows.glob("joint=*/month=*")):

@@ -169,16 +169,14 @@ def parameter_rows(trends: Sequence[Trend]) -> html.Html:
     def size(t: Trend, of: float) -> str:
         return "–" if math.isnan(share(t, of)) else say.amount(share(t, of))
 
-    states = {"trending": "going on"}
+    def state(t: Trend) -> str:
+        states = {"trending": "going on", "undetermined": say.undetermined_state(t)}
+        return states.get(t.state, t.state)
+
     return html.listed(
         trends,
         ("Parameter", lambda t: html.named(say.name(t.series.parameter), t.series.parameter)),
-        (
-            "State",
-            lambda t: (
-                say.undetermined_state(t) if t.state == "undetermined" else states.get(t.state, t.state)
-            ),
-        ),
+        ("State", state),
         ("#Now, 95 %", _level),
         ("#A year", slope),
         ("#Scatter of days", lambda t: size(t, t.day_sd) if t.day_sd else "–"),

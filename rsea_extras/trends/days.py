@@ -45,14 +45,8 @@ def day_means(series: Series, settings: TrendSettings) -> Days:
     def average(values: FloatArray) -> FloatArray:
         return np.add.reduceat(weight * values, starts) / total if len(starts) else values
 
-    return Days(
-        day[starts] + average(s.time_s / DAY - day),
-        average(y),
-        1.0 / total,
-        None if warmth is None else average(warmth),
-        mean,
-        scale,
-    )
+    t, warm = day[starts] + average(s.time_s / DAY - day), None if warmth is None else average(warmth)
+    return Days(t, average(y), 1.0 / total, warm, mean, scale)
 
 
 def outliers(time_s: FloatArray, value: FloatArray, sd: FloatArray, most: float) -> BoolArray:

@@ -131,18 +131,12 @@ def _series(joint: str, parameter: str, part: Table) -> Series:
     value = part["value"].astype(float)
     sd = (part["high"].astype(float) - part["low"].astype(float)) / (2.0 * Z95)
     usable = np.isfinite(value) & np.isfinite(sd) & (sd >= 0.0)
+    sd = np.where(usable, np.maximum(sd, 1e-9 * np.abs(value)), np.nan)
+    time_s, temperature = (part[n].astype(float) for n in ("time_s", "temperature"))
     return Series(
-        joint,
-        parameter,
-        str(part["unit"][0]),
-        part["time_s"].astype(float),
-        value,
-        np.where(usable, np.maximum(sd, 1e-9 * np.abs(value)), np.nan),
-        part["identifiable"].astype(bool) & usable,
-        part["temperature"].astype(float),
-        part["recording"],
-        part["artefacts"],
-    )
+        joint, parameter, str(part["unit"][0]), time_s, value, sd, part["identifiable"].astype(bool) & usable,
+        temperature, part["recording"], part["artefacts"],
+    )  # fmt: skip
 
 
 NULLS: Mapping[str, float] = {"gain": 1.0}
@@ -212,22 +206,18 @@ def _causes(joint: str, rows: np.ndarray, time_s: FloatArray, causes: npt.NDArra
 
 
 def _cause(
-    joint: str,
-    name: str,
-    rows: np.ndarray,
-    time_s: FloatArray,
-    of_recording: Sequence[Mapping[str, Any] | None],
+    joint: str, name: str, rows: np.ndarray, time_s: FloatArray, found: Sequence[Mapping[str, Any] | None]
 ) -> Naming:
-    main = next((c["sizes"][0] for c in of_recording if c is not None and len(c["sizes"])), None)
-    named = np.array([c is not None for c in of_recording])
-    statuses = [c["status"] for c in of_recording if c is not None]
+    main = next((c["sizes"][0] for c in found if c is not None and len(c["sizes"])), None)
+    named = np.array([c is not None for c in found])
+    statuses = [c["status"] for c in found if c is not None]
     status = max(set(statuses), key=statuses.count)
     if main is None:
         return Naming(joint, name, "cause", rows, time_s, named, status=status)
     null = NULLS.get(main["name"], 0.0)
-    sizes = np.array([_size(c, main["name"]) if c is not None else (np.nan,) * 3 for c in of_recording])
+    sizes = np.array([_size(c, main["name"]) if c is not None else (np.nan,) * 3 for c in found])
     size, sd = sizes[:, 0] - null, (sizes[:, 2] - sizes[:, 1]) / 3.92
-    gain = np.array([float(c["gain"]) if c is not None else np.nan for c in of_recording])
+    gain = np.array([float(c["gain"]) if c is not None else np.nan for c in found])
     limit = np.nan if main["name"] in ENDLESS else _limit(np.abs(size), gain)
     return Naming(
         joint, name, "cause", rows, time_s, named, main["name"], str(main["unit"]), size, sd, status, limit
@@ -268,15 +258,9 @@ def cause_sizes(every: Sequence[Naming], history: Table, recordings: Table) -> I
         if n.size is None or n.sd is None:
             continue
         recording, artefacts = (np.asarray(recordings[c])[n.row[n.named]] for c in ("recording", "artefacts"))
+        warm = np.array([temperature.get((n.joint, r), np.nan) for r in recording], float)
+        known, sd = np.isfinite(n.size) & np.isfinite(n.sd), np.maximum(n.sd, 1e-9)
         yield Series(
-            n.joint,
-            f"{n.about}.{n.parameter}",
-            n.unit,
-            n.time_s[n.named],
-            n.size[n.named],
-            np.maximum(n.sd, 1e-9)[n.named],
-            (np.isfinite(n.size) & np.isfinite(n.sd))[n.named],
-            np.array([temperature.get((n.joint, r), np.nan) for r in recording], float),
-            recording,
-            artefacts,
-        )
+            n.joint, f"{n.about}.{n.parameter}", n.unit, n.time_s[n.named], n.size[n.named], sd[n.named],
+            known[n.named], warm, recording, artefacts,
+        )  # fmt: skip

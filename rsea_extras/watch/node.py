@@ -228,12 +228,8 @@ TABLE = (
         "limit", 10.0, "largest torque of the page; the driver's counts where it is less", "N m", 0.0, 1e3
     ),
     ros.NodeParameter(
-        "growth",
-        20.0,
-        "of a page's torque; the driver's soft_start counts where it is less",
-        "N m/s",
-        0.1,
-        1e4,
+        "growth", 20.0, "of a page's torque; the driver's soft_start counts where it is less",
+        "N m/s", 0.1, 1e4,
     ),
     ros.NodeParameter("rate", 280.0, "of the page's commands, as the bench runs", "Hz", 50.0, 1000.0),
     ros.NodeParameter("rig", "paper_high_impedance", "the bench: a name of config/rigs, or a file"),

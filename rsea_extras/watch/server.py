@@ -90,13 +90,9 @@ class Server:
     """
 
     def __init__(
-        self,
-        source: FrameSource,
-        runs: Runs,
-        commander: Commander | None,
-        host: str = "localhost",
+        self, source: FrameSource, runs: Runs, commander: Commander | None, host: str = "localhost",
         port: int = 0,
-    ) -> None:
+    ) -> None:  # fmt: skip
         self._source, self._runs = source, runs
         self.desk = Desk(commander, runs)
         family = socket.AF_INET6 if ":" in host else socket.AF_INET

@@ -11,7 +11,6 @@ from fleet_stubs import HIP, KNEE, stub_work
 from rsea_extras.cli import fleet
 from rsea_extras.fleet import task
 from rsea_extras.fleet.sources import bags_of
-from rsea_ros.cli.main import main
 from rsea_ros.processes import Stopped
 
 MAP = """joints:
@@ -20,31 +19,16 @@ MAP = """joints:
 """
 
 
-@pytest.fixture
-def run(tmp_path, folder, monkeypatch, capsys):
-    """Return a function that runs a map over the folder with stubs: status, and the lines printed."""
-    monkeypatch.setattr(task, "work", stub_work)
-
-    def run(text, *sources):
-        (tmp_path / "joints.yaml").write_text(text)
-        paths = ["--map", str(tmp_path / "joints.yaml"), "--out", str(tmp_path / "new")]
-        status = main(["fleet", "run", str(folder), *sources, *paths, "--serial"])
-        said = capsys.readouterr()
-        return status, said.out.splitlines(), said.err.splitlines()
-
-    return run
-
-
-def test_a_map_that_fits_no_recording_is_refused(run, tmp_path, folder):
+def test_a_map_that_fits_no_recording_is_refused(call, tmp_path, folder):
     """A wrong pattern gave `nothing new`, status 0 and an empty store."""
-    status, out, err = run(MAP.replace("'*'", "knees/*"))
+    status, out, err = call("run", folder, "--out", tmp_path / "new", joints=MAP.replace("'*'", "knees/*"))
     assert (status, out, len(err)) == (2, [], 1)
     assert "recordings, of no joint of" in err[0] and str(folder) in err[0]
     assert not (tmp_path / "new").exists()
 
 
-def test_a_joint_without_a_recording_is_named(run):
-    status, out, _ = run(MAP)
+def test_a_joint_without_a_recording_is_named(call, tmp_path, folder):
+    status, out, _ = call("run", folder, "--out", tmp_path / "new", joints=MAP)
     assert status == 0
     assert "no recording of hip: no path matches its bags: hip/*" in out
 

@@ -7,13 +7,6 @@ import numpy as np
 START, DAY = 1_735_689_600.0, 86400.0  # 2025-01-01 UTC
 
 
-def columns(rows, names):
-    """Return a table of rows (dicts) as columns."""
-    return {
-        n: np.array([r[n] for r in rows], dtype=object if n in ("faults", "causes") else None) for n in names
-    }
-
-
 def history(
     rng, joints=("a",), parameter="spring.stiffness", level=1500.0, course=None, days=250, each=2, sd=0.004,
     day_sd=0.006, per_kelvin=0.0, temperature=None, told=1.0,
@@ -35,19 +28,10 @@ def history(
 def _columns(rng, joint, parameter, day, value, half, warm, told):
     n = len(day)
     names = np.array([f"bag{i:05d}" for i in range(n)])
-    return {
-        "joint": np.full(n, joint),
-        "parameter": np.full(n, parameter),
-        "unit": np.full(n, "N m/rad"),
-        "time_s": START + DAY * (day + rng.uniform(0.3, 0.7, n)),
-        "value": value,
-        "low": value - half,
-        "high": value + half,
-        "identifiable": rng.random(n) < told,
-        "temperature": warm,
-        "recording": names,
-        "artefacts": np.char.add("artefacts/", names),
-    }
+    texts = {"joint": np.full(n, joint), "parameter": np.full(n, parameter), "unit": np.full(n, "N m/rad")}
+    when = {"time_s": START + DAY * (day + rng.uniform(0.3, 0.7, n)), "identifiable": rng.random(n) < told}
+    numbers = {"value": value, "low": value - half, "high": value + half, "temperature": warm}
+    return texts | when | numbers | {"recording": names, "artefacts": np.char.add("artefacts/", names)}
 
 
 def recordings(joints=("a",), days=250, causes=None, faults=None):
@@ -61,22 +45,14 @@ def recordings(joints=("a",), days=250, causes=None, faults=None):
         for joint in joints
         for d in range(days)
     ]  # fmt: skip
-    out = {n: np.array([r[n] for r in rows]) for n in rows[0] if n not in ("faults", "causes")}
-    for n in ("faults", "causes"):
-        out[n] = np.empty(len(rows), dtype=object)
-        out[n][:] = [r[n] for r in rows]
-    return out
+    lists = {n: np.empty(len(rows), dtype=object) for n in ("faults", "causes")}
+    for n, column in lists.items():
+        column[:] = [r[n] for r in rows]
+    return {n: lists[n] if n in lists else np.array([r[n] for r in rows]) for n in rows[0]}
 
 
 def cause(name, size, parameter="gap", unit="rad", gain=0.5, doubt=0.02, status="confirmed", probability=0.9):
     """Return a cause in the form of the store."""
-    sizes = [
-        {
-            "name": parameter,
-            "value": size,
-            "low": size * (1 - doubt),
-            "high": size * (1 + doubt),
-            "unit": unit,
-        }
-    ]
+    low, high = size * (1 - doubt), size * (1 + doubt)
+    sizes = [{"name": parameter, "value": size, "low": low, "high": high, "unit": unit}]
     return {"name": name, "status": status, "probability": probability, "gain": gain, "sizes": sizes}
