@@ -5,6 +5,7 @@ wheel gets `rsea` alone: names such as `driver` belong to nobody's PATH.
 """
 
 import sys
+from configparser import ConfigParser
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -12,8 +13,14 @@ from setuptools import find_packages, setup
 
 NODES = (
     "controller", "driver", "excite", "experiment", "health", "identify", "joint", "model", "plant",
-    "record", "replay", "watch",
+    "record", "replay",
 )  # fmt: skip
+EXTRAS = ConfigParser()
+EXTRAS.read("rsea_extras/entry_points.txt", encoding="utf-8")
+"""What the extras register; nothing where their folder is missing."""
+EXECUTABLES = {node: f"rsea_ros.nodes.{node}" for node in NODES}
+if "rsea_ros.nodes" in EXTRAS:
+    EXECUTABLES |= EXTRAS["rsea_ros.nodes"]
 MANIFEST = ElementTree.parse("package.xml").getroot()
 NAME = MANIFEST.findtext("name")
 SHARE = Path("share") / NAME
@@ -39,7 +46,7 @@ setup(
     maintainer=MANIFEST.findtext("maintainer"),
     maintainer_email=MANIFEST.find("maintainer").get("email"),
     license=MANIFEST.findtext("license"),
-    packages=find_packages(include=["rsea_ros*", "msg_adapters*"]),
+    packages=find_packages(include=["rsea_ros*", "rsea_extras*", "msg_adapters*"]),
     python_requires=">=3.10",
     install_requires=requirements("run"),
     extras_require={part: requirements(part) for part in ("can", "fleet", "export")},
@@ -51,7 +58,8 @@ setup(
         "rsea_ros.hardware.dynamixel": ["models/*.yaml"],
         "rsea_ros.hardware.mit_can": ["models/*.yaml"],
         "rsea_ros.nodes": ["*.xml"],
-        "rsea_ros.watch": ["page/*"],
+        "rsea_extras": ["entry_points.txt"],
+        "rsea_extras.watch": ["page/*"],
     },
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
@@ -63,7 +71,8 @@ setup(
     entry_points={
         "console_scripts": [
             "rsea = rsea_ros.cli.main:main",
-            *(f"{node} = rsea_ros.nodes.{node}:main" for node in NODES if not IS_WHEEL),
-        ]
+            *(f"{node} = {module}:main" for node, module in EXECUTABLES.items() if not IS_WHEEL),
+        ],
+        **{group: [" = ".join(each) for each in EXTRAS[group].items()] for group in EXTRAS.sections()},
     },
 )

@@ -66,7 +66,7 @@ def test_the_executables_are_where_ros2_run_looks(workspace):
     assert (workspace / marker).is_file()
 
 
-@pytest.mark.parametrize("top", ["rsea_ros", "msg_adapters"])
+@pytest.mark.parametrize("top", ["rsea_ros", "rsea_extras", "msg_adapters"])
 def test_every_module_is_installed(workspace, top):
     (installed,) = (workspace / "install/rsea_ros/lib").glob(f"python3*/site-packages/{top}")
     assert files(installed, "*.py") == files(ROOT / top, "*.py")

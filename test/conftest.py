@@ -66,7 +66,7 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 WAITING = (
-    "cli/test_demo", "nodes/", "hardware/test_faults", "hardware/test_lost_torque",
+    "cli/test_demo", "nodes/", "extras/nodes/", "hardware/test_faults", "hardware/test_lost_torque",
     "hardware/test_protection", "hardware/test_frames", "hardware/test_netft", "hardware/test_line",
     "hardware/test_same_motor", "hardware/test_series", "hardware/test_mit_motor",
 )  # fmt: skip
@@ -74,15 +74,16 @@ WAITING = (
 
 PATIENT = (
     "cli/test_run_launch_topics", "nodes/test_identify_diagnosis", "nodes/test_parameters",
-    "nodes/test_policies", "nodes/test_processes", "watch/test_page", "watch/test_server", "cli/test_bench",
-    "cli/test_ctrl_c", "msg_adapters/test_cdr",
+    "nodes/test_policies", "nodes/test_processes", "extras/watch/test_page", "extras/watch/test_server",
+    "cli/test_bench", "cli/test_ctrl_c", "msg_adapters/test_cdr",
 )  # fmt: skip
 """Files that wait for processes and are late for nothing: any worker takes them, at the end."""
 
 COMPUTING = (
     "golden/", "diagnosis/test_hidden_effects", "test_realdata", "test_launcher", "health/test_monitor",
     "checks/test_dead", "experiment/", "checks/test_clocks", "checks/test_gains", "laws/test_hidden_laws",
-    "report/", "effects/", "diagnosis/test_known_values", "control/test_controller", "test_docs",
+    "report/", "extras/pages/", "effects/", "diagnosis/test_known_values", "control/test_controller",
+    "test_docs",
 )  # fmt: skip
 """Files that compute longest, in this order, so that no worker is left with one of them at the end."""
 

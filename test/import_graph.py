@@ -7,7 +7,10 @@ from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-MODULES = sorted(path for top in ("rsea_ros", "msg_adapters") for path in (ROOT / top).rglob("*.py"))
+TOPS = ("rsea_ros", "msg_adapters", "rsea_extras")
+EXPANDED = ("rsea_ros", "rsea_ros.extension")
+"""Packages whose names are modules, or have one each."""
+MODULES = sorted(path for top in TOPS for path in (ROOT / top).rglob("*.py"))
 
 
 @cache
@@ -45,7 +48,7 @@ def imports(path: Path, source: str | ast.Module) -> Iterator[tuple[str, int]]:
             yield from ((alias.name, node.lineno) for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
             module = absolute(path, node)
-            names = [f"{module}.{alias.name}" for alias in node.names] if module == "rsea_ros" else [module]
+            names = [f"{module}.{alias.name}" for alias in node.names] if module in EXPANDED else [module]
             yield from ((name, node.lineno) for name in names)
 
 

@@ -8,9 +8,11 @@ from pathlib import Path
 import pytest
 from import_graph import MODULES, ROOT, found_in_modules, imports, name_of, nodes, tree_of
 
+from rsea_ros import DOOR
+
 BASE = {"errors", "records", "documents", "outputs", "plugins", "processes", "progress", "version"}
 CORE = BASE | {"effects", "model", "identification", "checks", "diagnosis", "control", "design"}
-AROUND = {"laws", "experiment", "health", "trends", "exports"}
+AROUND = {"laws", "experiment", "health", "exports"}
 OWN = {
     **{name: set() for name in ("errors", "progress", "version", "processes", "compiler")},
     "plugins": {"errors"},
@@ -27,24 +29,42 @@ OWN = {
     "laws": BASE | {"effects", "model", "identification", "checks", "diagnosis", "compiler"},
     "experiment": BASE | {"effects", "model", "identification", "checks", "diagnosis"},
     "health": BASE | {"effects", "model"},
-    "trends": BASE,
-    "fleet": CORE | {"trends", "report", "library", "msg_adapters"},
     "exports": BASE | {"effects", "model", "design"},
     "paper": BASE | {"effects", "model", "identification", "design", "report"},
-    "watch": BASE,
-    "benchmark": CORE,
     "hardware": BASE,
     "hardware.simulated": BASE | {"model"},
     "msg_adapters": BASE,
     "report": CORE | AROUND,
     "library": CORE | AROUND | {"report", "msg_adapters"},
-    "nodes": CORE | AROUND | {"hardware", "report", "msg_adapters", "watch"},
-    "cli": CORE | AROUND | {"paper", "hardware", "report", "msg_adapters", "nodes", "fleet", "watch"}
-    | {"benchmark"},
+    "nodes": CORE | AROUND | {"hardware", "report", "msg_adapters"},
+    "cli": CORE | AROUND | {"paper", "hardware", "report", "msg_adapters", "nodes"},
+    "extension": CORE | AROUND | {"report", "msg_adapters", "nodes", "cli"},
     "__main__": {"cli"},
     "__init__": CORE | {"library"},
 }
-"""Layers of this project that a layer may import beside itself."""
+"""Layers of this project that a layer may import beside itself; none imports the extras or the extension."""
+
+EXTRAS = {
+    "trends": set(),
+    "pages": {"trends"},
+    "fleet": {"trends", "pages"},
+    "exports": set(),
+    "watch": set(),
+    "benchmark": set(),
+    "cli": {"trends", "pages", "fleet", "watch", "benchmark"},
+}
+"""Parts of rsea_extras, and those that each may import beside itself."""
+PUBLIC = {
+    "rsea_ros": "the door, its names alone",
+    "rsea_ros.extension.base": "one way to refuse, to read documents and to write files; arrays of a record",
+    "rsea_ros.extension.rigs": "rigs, effects, import maps and topics as text: the door has objects",
+    "rsea_ros.extension.recording": "a fleet keeps what each step finds; the door does them at once",
+    "rsea_ros.extension.page": "pages and result files that look alike",
+    "rsea_ros.extension.verb": "options, tables and exit status of a verb",
+    "rsea_ros.extension.node": "parameters, clock and health of a node, and its message types",
+    "rsea_ros.extension.target": "what an export states of a rig, from the equations that the simulation has",
+}
+"""What rsea_extras may import of rsea_ros, with the reason; test/extras/test_registered.py: it needs all."""
 
 NUMERIC = {"numpy", "scipy", "control", "numba", "llvmlite"}
 MESSAGES = {
@@ -58,11 +78,7 @@ FOREIGN = {
     "identification": NUMERIC | {"threadpoolctl"},
     **dict.fromkeys(("effects", "model", "checks", "diagnosis", "control", "design"), NUMERIC),
     **dict.fromkeys(("laws", "experiment", "health", "paper"), NUMERIC),
-    "trends": {"numpy", "scipy"},
-    "fleet": {"numpy", "dask", "distributed", "fsspec", "pyarrow", "duckdb", "yaml"},
-    "exports": NUMERIC | {"mujoco", "fmpy", "pythonfmu3"},
-    "watch": {"tornado"},
-    "benchmark": {"numpy"},
+    "exports": NUMERIC | {"mujoco"},
     "library": {"numpy", "plotly", "rich"},
     "hardware": {"numpy", "dynamixel_sdk", "serial", "can"},
     "msg_adapters": {"numpy", "scipy", "yaml", "rosbags", "lz4", "backports", "compression"}
@@ -71,6 +87,12 @@ FOREIGN = {
     "report": {"numpy", "rich"},
     "nodes": {"numpy", "rclpy", "rich", "yaml"},
     "cli": {"numpy", "rich", "rclpy", "yaml"},
+    "rsea_extras.trends": {"numpy", "scipy"},
+    "rsea_extras.fleet": {"numpy", "dask", "distributed", "fsspec", "pyarrow", "duckdb"},
+    "rsea_extras.pages": {"numpy"},
+    "rsea_extras.exports": {"numpy", "fmpy", "pythonfmu3"},
+    "rsea_extras.watch": {"tornado", "rclpy"},
+    "rsea_extras.benchmark": {"numpy"},
 }
 """Packages of others that a layer may import beside the standard library."""
 
@@ -85,8 +107,11 @@ def layer_of(module: str) -> str:
 
 def offences(path: Path, source: str | ast.Module) -> list[str]:
     """Return the forbidden imports of a source at that path."""
-    layer = layer_of(name_of(path))
-    forbidden = [(module, line) for module, line in imports(path, source) if not may_import(layer, module)]
+    name = name_of(path)
+    extra = ".".join(name.split(".")[:2]) if name.startswith("rsea_extras") else ""
+    layer = extra or layer_of(name)
+    may = extra_may_import if extra else may_import
+    forbidden = [(module, line) for module, line in imports(path, source) if not may(layer, module)]
     return [f"line {line}: layer {layer} may not import {module}" for module, line in forbidden]
 
 
@@ -96,6 +121,17 @@ def may_import(layer: str, module: str) -> bool:
     if top in ("rsea_ros", "msg_adapters"):
         return layer_of(module).split(".")[0] in OWN[layer] | {whole}
     return top in sys.stdlib_module_names or top in FOREIGN.get(whole, set())
+
+
+def extra_may_import(layer: str, module: str) -> bool:
+    """Return whether a part of rsea_extras may: the public modules, and the names of the door."""
+    top, _, rest = module.partition(".")
+    if top == "rsea_ros":
+        return module in PUBLIC or rest in DOOR
+    if top == "rsea_extras":
+        own = layer.partition(".")[2]
+        return rest.split(".")[0] in EXTRAS[own] | {own}
+    return top in sys.stdlib_module_names or top in FOREIGN.get(layer, set())
 
 
 def test_a_module_imports_only_what_its_layer_may():
@@ -109,9 +145,16 @@ def test_a_module_imports_only_what_its_layer_may():
         ("rsea_ros/effects/backlash.py", "from ..model import rig", 1),
         ("rsea_ros/nodes/plant.py", "from sensor_msgs.msg import JointState", 1),
         ("msg_adapters/bags.py", "from rsea_ros.model.rig import Rig", 1),
+        ("rsea_ros/cli/main.py", "from rsea_extras.cli import fleet", 1),
+        ("rsea_ros/model/rig.py", "from rsea_ros.extension.base import quote", 1),
+        ("rsea_extras/fleet/store.py", "from rsea_ros.model.rig import Rig", 1),
+        ("rsea_extras/fleet/store.py", "from rsea_ros import model", 1),
+        ("rsea_extras/trends/days.py", "from rsea_extras.fleet import store", 1),
         ("rsea_ros/model/rig.py", "import numpy as np\nfrom rsea_ros.effects.effect import Effect", 0),
         ("rsea_ros/hardware/simulated.py", "from rsea_ros.model.simulation import Plant", 0),
         ("rsea_ros/report/figures/response.py", "import numpy\nfrom ...identification import result", 0),
+        ("rsea_extras/fleet/store.py", "import pyarrow\nfrom rsea_ros import Record, Rig", 0),
+        ("rsea_extras/pages/page.py", "from rsea_extras.trends.days import Days", 0),
     ],
 )
 def test_an_offence_is_found_and_an_allowed_import_passes(place, source, count):

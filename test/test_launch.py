@@ -14,6 +14,8 @@ from typing import Any
 import pytest
 import yaml
 
+from rsea_ros.plugins import node_modules
+
 ROOT = Path(__file__).resolve().parents[1]
 LAUNCH = ROOT / "launch"
 API = {
@@ -109,7 +111,7 @@ def test_a_node_gets_a_parameter_file_and_parameters_that_it_declares(describe):
         if isinstance(file, Part):
             file = defaults(describe("graph"))[file.arguments[0]]
         given = set(yaml.safe_load(Path(file).read_text())["/**"]["ros__parameters"]) | set(parameters)
-        table = importlib.import_module(f"rsea_ros.nodes.{name}").TABLE
+        table = importlib.import_module(node_modules()[name]).TABLE
         assert given <= {parameter.name for parameter in table}, name
 
 

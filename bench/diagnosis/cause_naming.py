@@ -28,8 +28,8 @@ from independent.severities import SEVERITIES, drawn_parameters
 sys.path.append(str(Path(__file__).resolve().parents[2]))  # `rsea benchmark make` runs this file
 
 from bench.diagnosis.commands import COMMANDS
-from rsea_ros.benchmark.dataset import COLUMNS, LIMIT, MANIFEST, VERSION, truth_path
-from rsea_ros.benchmark.scoring import RecordTruth, truth_hash
+from rsea_extras.benchmark.dataset import COLUMNS, LIMIT, MANIFEST, VERSION, truth_path
+from rsea_extras.benchmark.scoring import RecordTruth, truth_hash
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.model.rig_file import load_rig, rig_text
 from rsea_ros.outputs.files import Destination, NewFiles, check_free, write_file

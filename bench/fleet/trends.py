@@ -21,9 +21,9 @@ import numpy as np
 from independent.bench import drawn_bench
 
 from bench.results import Row, read_lines, resumed
-from rsea_ros.report.fleet.page import write_fleet_report
-from rsea_ros.trends import Alarm, alarms
-from rsea_ros.trends.alarms import by_joint
+from rsea_extras.pages.page import write_fleet_report
+from rsea_extras.trends import Alarm, alarms
+from rsea_extras.trends.alarms import by_joint
 
 START, DAY = 1_735_689_600.0, 86400.0
 """2025-01-01 UTC, s."""

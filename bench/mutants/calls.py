@@ -32,7 +32,8 @@ sys.modules["recorder"] = module_from_spec(spec)
 spec.loader.exec_module(sys.modules["recorder"])
 """
 WAIT = (
-    "test/nodes/", "test/watch/", "test/cli/test_demo", "test/cli/test_run_launch",
+    "test/nodes/", "test/extras/watch/", "test/extras/nodes/", "test/cli/test_demo",
+    "test/cli/test_run_launch",
     *(f"test/hardware/test_{name}" for name in ("faults", "lost", "frames", "netft", "line")),
 )  # fmt: skip
 """Tests that wait for nodes and wires."""
@@ -84,9 +85,8 @@ def _note() -> None:
             "PYTHONPATH": f"{folder}{os.pathsep}{ROOT}",
         }  # fmt: skip
         words = [sys.executable, "-m", "pytest", "-q", "-p", "recorder", "-n", "2", "--dist", "loadfile"]
-        words.append(
-            "--ignore=test/fleet/test_time_limit.py"
-        )  # ends threads by exceptions: never, beside the recorder
+        # ends threads by exceptions: never, beside the recorder
+        words.append("--ignore=test/extras/fleet/test_time_limit.py")
         with suppress(subprocess.TimeoutExpired):  # a test that hangs has noted its calls too
             subprocess.run(
                 words, cwd=ROOT, env=environment, check=False, stdout=subprocess.DEVNULL, timeout=LONGEST

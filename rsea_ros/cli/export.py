@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
@@ -20,6 +20,7 @@ from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_document import check_effects
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.outputs.files import Destination, NewFiles, check_free, write_file
+from rsea_ros.plugins import TARGETS, installed, not_installed, registered
 from rsea_ros.records.record import FloatArray
 from rsea_ros.report.result_files import DIAGNOSIS_JSON, MODEL, pick
 
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
 
 HELP = "convert a rig to MuJoCo, FMI, URDF, SDF, Isaac Lab, BAM or C; list the parts left out"
 EXAMPLE = "rsea export --mjcf paper_high_impedance --out bench.xml"
-TARGETS = {
+ABOUT = {
     "mjcf": "MJCF for MuJoCo 4",
     "urdf": "URDF, with a block of all values",
     "sdf": "SDF 1.11, with a block of all values",
@@ -44,7 +45,7 @@ _NUMBERS = "times_noise rms signal noise unit"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     targets = parser.add_mutually_exclusive_group(required=True)
-    for name, about in TARGETS.items():
+    for name, about in abouts().items():
         aliases = ["--rig"] if name == "mjcf" else []
         about = f"rig, model.yaml or name of a rig: {about}"
         targets.add_argument(f"--{name}", *aliases, dest=name, metavar="RIG", help=about)
@@ -66,7 +67,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     from rsea_ros.cli.simulate import parse_effect
 
-    target = next(name for name in TARGETS if getattr(args, name) is not None)
+    target = next(name for name in abouts() if getattr(args, name) is not None)
     source = getattr(args, target)
     rig = load_rig(source)
     rig = rig.with_effects(*rig.effects, *(parse_effect(text) for text in args.effect))
@@ -93,15 +94,29 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _export(target: str, rig: Rig, args: argparse.Namespace) -> Export:
-    """Return a rig for a target, by `export_TARGET` of exports/TARGET.py; SDF is in that of URDF."""
+    """Return a rig for a target, by the function that is registered for it."""
     options: dict[str, Any] = {}
     if target == "bam":
         options = {"actuator": args.actuator}
     elif target == "feedforward":
         options = _measured(args.feedforward, rig) | {"suffix": args.out.suffix if args.out else ""}
-    module = import_module(f"rsea_ros.exports.{'urdf' if target == 'sdf' else target}")
-    made: Export = getattr(module, f"export_{target}")(rig, **options)
+    made: Export = exporter(target)(rig, **options)
     return made
+
+
+def abouts() -> dict[str, str]:
+    """Return what each target is, by name; those that other packages register included."""
+    return ABOUT | {n: f"target of {at}" for n, at in installed(TARGETS).items() if n not in ABOUT}
+
+
+def exporter(target: str) -> Callable[..., Any]:
+    """Return the function that makes a target of a rig. Raises ParameterError where it is not installed."""
+    place = "rsea_ros.exports.mjcf:export_mjcf" if target == "mjcf" else registered(TARGETS, target)
+    if not place:
+        raise not_installed(f"--{target}")
+    module, _, name = place.partition(":")
+    function: Callable[..., Any] = getattr(import_module(module), name)
+    return function
 
 
 def _measured(source: str, rig: Rig) -> dict[str, Any]:
@@ -162,7 +177,7 @@ def _lines(made: Export, rig: Rig, out: Path, verified: Verification) -> list[st
     """Return the report as text: file, content, omissions and what they cost, differences."""
     from rsea_ros.exports.others import coverage_lines
 
-    lines = [f"{out}: {TARGETS[made.target]}, of {rig.name}"]
+    lines = [f"{out}: {ABOUT.get(made.target, made.target)}, of {rig.name}"]
     lines += [f"  {line}" for line in coverage_lines(made.says, made.leaves_out)]
     lines += [f"  without {name}: {_apart(one)}" for name, one in verified.losses.items()]
     lines += [f"played in both: {_apart(one)}" for one in verified.differences]

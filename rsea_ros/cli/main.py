@@ -10,9 +10,11 @@ import sys
 import traceback
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
+from importlib.util import find_spec
 from pathlib import Path
 from typing import NoReturn, Protocol, cast
 
+from rsea_ros import plugins
 from rsea_ros.cli import _terminal
 from rsea_ros.documents.wording import did_you_mean, printable
 from rsea_ros.errors import ParameterError, RseaError
@@ -43,10 +45,12 @@ def compilation_announced() -> Iterator[None]:
 SUCCESS, BAD_INPUT, INTERRUPTED, READER_GONE = 0, 2, 130, 141
 _HELP, _VERSION = ("-h", "--help"), "--version"
 FAULT = "this is a bug in rsea, please report it"
+EXTRA = ("benchmark", "fleet", "watch")
+"""Verbs of rsea_extras, to say so where it is not installed."""
 
 
 class Verb(Protocol):
-    """The interface of a verb: a module in this directory."""
+    """The interface of a verb: a module in this directory, or one that another package registers."""
 
     HELP: str
     EXAMPLE: str
@@ -62,10 +66,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run `rsea VERB …` and return its exit status: 0, 1 for a finding of --fail-on, 2 for bad input."""
     arguments = list(sys.argv[1:] if argv is None else argv)
     name = arguments[0] if arguments else "--help"
-    prefix = f"rsea {name}" if name in verbs() else "rsea"
+    prefix = "rsea"
     with _terminal.show_controls(), compilation_announced(), Stops() as stops:
         try:
-            status = _call(name, arguments[1:])
+            if module := "" if name.startswith("-") else module_of(name):
+                prefix = f"rsea {name}"
+            status = _call(name, module, arguments[1:])
             sys.stdout.flush()
             return status
         except BrokenPipeError:
@@ -84,27 +90,37 @@ def main(argv: Sequence[str] | None = None) -> int:
             return _fail(prefix, _fault(error))
 
 
-def verbs() -> dict[str, Path]:
-    """Return the file of every verb by name: the modules beside this one (`import_.py` is `import`)."""
-    files = sorted(Path(__file__).parent.glob("*.py"))
-    return {f.stem.rstrip("_"): f for f in files if not f.stem.startswith("_") and f.stem != "main"}
+def core_verbs() -> dict[str, str]:
+    """Return the module of every verb beside this one by name (`import_.py` is `import`)."""
+    stems = sorted(file.stem for file in Path(__file__).parent.glob("[!_]*.py") if file.stem != "main")
+    return {stem.rstrip("_"): f"{__package__}.{stem}" for stem in stems}
 
 
-def summary(path: Path) -> str:
-    """Return the HELP string of a verb's file, read from its syntax tree."""
-    for node in ast.parse(path.read_text(encoding="utf-8")).body:
-        match node:
-            case ast.Assign(targets=[ast.Name(id="HELP")], value=ast.expr() as text):
-                return str(ast.literal_eval(text))
-            case ast.AnnAssign(target=ast.Name(id="HELP"), value=ast.expr() as text):
-                return str(ast.literal_eval(text))
-    return ""
+def verbs() -> dict[str, str]:
+    """Return the module of every verb by name, those that other packages register included."""
+    return dict(sorted((plugins.installed(plugins.VERBS) | core_verbs()).items()))
 
 
-def _call(name: str, arguments: Sequence[str]) -> int:
+def module_of(verb: str) -> str:
+    """Return the module of a verb, empty for none. Raises ParameterError for one that is not installed."""
+    module = core_verbs().get(verb) or plugins.registered(plugins.VERBS, verb)
+    if not module and verb in EXTRA:
+        raise plugins.not_installed(f"rsea {verb}")
+    return module
+
+
+def summary(module: str) -> str:
+    """Return the HELP string of a verb, read from its file."""
+    spec = find_spec(module)
+    lines = Path(spec.origin).read_text(encoding="utf-8") if spec and spec.origin else ""
+    stated = re.search(r'^HELP(?:: str)? = (\(?(?:\s*"(?:[^"\\]|\\.)*")+\s*\)?)$', lines, re.MULTILINE)
+    return str(ast.literal_eval(stated[1])) if stated else ""
+
+
+def _call(name: str, module: str, arguments: Sequence[str]) -> int:
     """Run a verb, or print the overview. Raises ParameterError for an unknown verb."""
     if name in _HELP:
-        rows = [(f"  {name}", summary(path)) for name, path in verbs().items()]
+        rows = [(f"  {name}", summary(module)) for name, module in verbs().items()]
         closing = "rsea VERB --help shows the arguments of a verb with units, and an example; rsea --version."
         closing = wrap(closing, _terminal.width())
         print("\n".join(["usage: rsea VERB …", "", _terminal.columns(rows), "", closing]))
@@ -114,24 +130,22 @@ def _call(name: str, arguments: Sequence[str]) -> int:
 
         print(f"rsea_ros {version()}")
         return SUCCESS
-    if name not in verbs():
-        from rsea_ros.cli.run import node_names
-
+    if not module:
         near = did_you_mean(name, [*verbs(), *_HELP, _VERSION])
-        meant = f", did you mean run {name}?" if name in node_names() else near
+        meant = f", did you mean run {name}?" if name in plugins.node_modules() else near
         raise ParameterError(f"no verb {name!r}, expected one of: {', '.join(verbs())}{meant}")
     if effects := os.environ.get("RSEA_EFFECTS"):
         _fail(f"rsea {name}", f"RSEA_EFFECTS={effects}: code from there runs as part of this program")
-    return _run(name, arguments)
+    return _run(name, module, arguments)
 
 
-def _run(name: str, arguments: Sequence[str]) -> int:
+def _run(name: str, module: str, arguments: Sequence[str]) -> int:
     """Import the verb, parse its arguments and run it.
 
     A verb that passes arguments to another program sets the default `pass_on`, which receives the unknown
     arguments.
     """
-    verb = cast(Verb, importlib.import_module(f"rsea_ros.cli.{verbs()[name].stem}"))
+    verb = cast(Verb, importlib.import_module(module))
     parser = _Parser(
         prog=f"rsea {name}",
         description=verb.HELP,

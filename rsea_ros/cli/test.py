@@ -20,16 +20,18 @@ GROUPS = {
     "science": (
         "test/checks", "test/control", "test/design", "test/diagnosis", "test/effects", "test/experiment",
         "test/health", "test/identification", "test/independent", "test/laws", "test/model", "test/paper",
-        "test/trends",
+        "test/extras/trends",
     ),
     "safety": (
-        "test/hardware", "test/nodes", "test/cli/test_run_launch_topics.py", "test/test_stamps.py",
-        "test/test_held_commands.py", "test/cli/test_ctrl_c.py",
+        "test/hardware", "test/nodes", "test/extras/nodes", "test/cli/test_run_launch_topics.py",
+        "test/test_stamps.py", "test/test_held_commands.py", "test/cli/test_ctrl_c.py",
     ),
     "contract": ("test/golden", "test/cli", "test/library", "test/msg_adapters", "test/test_imports.py"),
     "all": (),
 }  # fmt: skip
-"""What each group runs: physics and statistics; what keeps torque off; what other programs rely on."""
+"""What each group runs: physics and statistics; what keeps torque off; what other programs rely on.
+
+A tree without the extras lacks their folders."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -50,7 +52,8 @@ def run(args: argparse.Namespace) -> int:
         raise RseaError(f"{root}: no tests here, expected the repository: run ./rsea test in a clone")
     cores = min(os.cpu_count() or 1, MOST)
     workers = ["-n", str(cores + 1), "--dist", "loadfile"] if cores > 1 else []
-    chosen = [path for word in args.pass_on for path in GROUPS.get(word, (word,))]
+    groups = {name: [path for path in paths if (root / path).exists()] for name, paths in GROUPS.items()}
+    chosen = [path for word in args.pass_on for path in groups.get(word, [word])]
     environment = os.environ | {"PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}
     if args.renew:
         environment["RSEA_RENEW"] = "1"

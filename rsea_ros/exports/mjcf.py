@@ -13,7 +13,7 @@ import numpy as np
 from rsea_ros.design.mujoco_model import SOLIMP, SOLREF, STEP, model_element, text
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.exports import others
-from rsea_ros.exports.chain import check_rotary
+from rsea_ros.exports.verification import play_mujoco
 from rsea_ros.model.equations import train_ratio, with_structure
 from rsea_ros.model.rig import Rig
 
@@ -241,7 +241,7 @@ def export_mjcf(rig: Rig) -> others.Export:
 
     Raises RigError for a rig that MJCF cannot represent (see design/mujoco_model.py).
     """
-    check_rotary(rig)
+    others.check_rotary(rig)
     rig = others.without_null_effects(rig)
     finite = others.finite_sizes(rig)
     play = next((float(one.parameters["gap"]) for one in rig.effects if one.name == "backlash"), 0.0)
@@ -259,4 +259,4 @@ def export_mjcf(rig: Rig) -> others.Export:
     perfect = "sensors of MJCF are those of perfect instruments; the rig's noise and quanta stay with the rig"
     left |= others.omitted_sensors(rig, perfect)
     root.insert(0, others.coverage_comment(says, left))
-    return others.Export("mjcf", ".xml", text(root), says, left)
+    return others.Export("mjcf", ".xml", text(root), says, left, play_mujoco)

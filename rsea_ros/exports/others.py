@@ -1,15 +1,17 @@
 """Effects in the terms of another simulator, and what is left out."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 from xml.etree import ElementTree as xml
 
 from rsea_ros.documents.units import plain
 from rsea_ros.effects.catalogue import effect_named
+from rsea_ros.errors import RigError
 from rsea_ros.model.equations import rotor_inertia, train_ratio
 from rsea_ros.model.rig import END_NAMES, Rig
+from rsea_ros.records.record import FloatArray
 
 
 class Unrepresentable(Exception):
@@ -21,6 +23,7 @@ class Export:
     """The file for a target. content: text, the bytes of an archive, or the texts of several files by name.
 
     says: the parts of a rig that the target has, in its terms. leaves_out: the others, and what it lacks.
+    play: its measurements at the beginning of each command's hold, of content, rig and commands at RATE.
     """
 
     target: str
@@ -28,6 +31,13 @@ class Export:
     content: str | bytes | Mapping[str, str]
     says: Mapping[str, str]
     leaves_out: Mapping[str, str]
+    play: Callable[[Any, Rig, FloatArray], Mapping[str, FloatArray]] | None = None
+
+
+def check_rotary(rig: Rig) -> None:
+    """Raise RigError for a rig that moves along a line: the joints and bodies of exports turn."""
+    if rig.linear:
+        raise RigError(f"rig {rig.name}: moves along a line, expected a rotary rig for this target")
 
 
 def coverage_lines(says: Mapping[str, str], leaves_out: Mapping[str, str]) -> list[str]:

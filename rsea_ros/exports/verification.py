@@ -1,10 +1,8 @@
 """Exports played in MuJoCo and FMPy against the own simulation, and how they differ."""
 
 import math
-import tempfile
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as xml
 
@@ -15,7 +13,6 @@ from rsea_ros.errors import ParameterError, RseaError
 from rsea_ros.exports.others import Export
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.simulation import simulate
-from rsea_ros.outputs.files import write_new
 from rsea_ros.records.record import UNITS, Channel, FloatArray, Record
 
 RATE = 250.0
@@ -186,36 +183,6 @@ def _slip(x: FloatArray, limit: float) -> FloatArray:
     return slipped
 
 
-def play_fmu(archive: bytes, rig: Rig, command: FloatArray) -> dict[str, FloatArray]:
-    """Return the measurements of the exported rig at the beginning of each command's hold.
-
-    command: N m, or target rad of a rig with a position loop, at RATE. Raises ParameterError without FMPy.
-    """
-    try:
-        from fmpy import simulate_fmu
-        from fmpy.fmi1 import FMICallException
-    except ImportError:
-        raise ParameterError(
-            "playing the FMU needs the package fmpy, which is not installed: pip install fmpy, or --no-play"
-        ) from None
-    driven = "torque_command" if rig.loop is None else "desired_position"
-    t = np.arange(len(command)) / RATE
-    given = np.array(list(zip(t, command, strict=True)), dtype=[("time", "f8"), (driven, "f8")])
-    names = [name for name in CHANNELS if rig.measures(name)]
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "rig.fmu"
-        write_new(file, archive)
-        try:
-            result = simulate_fmu(
-                str(file), stop_time=float(t[-1]), step_size=1.0 / RATE, output_interval=1.0 / RATE,
-                input=given, output=names, validate=True, start_values={"duration": len(t) / RATE},
-            )  # fmt: skip
-        except FMICallException as error:
-            raise ParameterError(f"FMPy: {' '.join(str(error).split())}") from None
-    return {name: np.asarray(result[name], np.float64) for name in names}
-
-
-PLAYERS: Mapping[str, Callable[..., Any]] = {"mjcf": play_mujoco, "fmu": play_fmu}
 NO_NOISE = "the rig states no sensor noise, expected sensors.ft.noise or another"
 
 
@@ -236,10 +203,11 @@ def verify(made: Export, rig: Rig, command: FloatArray) -> Verification:
 
     command: N m, or target rad of a rig with a position loop, at RATE.
     """
-    theirs, why = {}, "only --mjcf and --fmu are verified by simulation"
+    theirs: Mapping[str, FloatArray] = {}
+    why = "only --mjcf and --fmu are verified by simulation"
     try:
-        if made.target in PLAYERS:
-            theirs, why = PLAYERS[made.target](made.content, rig, command), NO_NOISE
+        if made.play:
+            theirs, why = made.play(made.content, rig, command), NO_NOISE
     except ParameterError as error:
         why = str(error)
     if not theirs and not {effect.name for effect in rig.effects}.intersection(made.leaves_out):

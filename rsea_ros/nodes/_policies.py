@@ -23,11 +23,9 @@ from rsea_ros.model.rig import Sensor
 from rsea_ros.model.rig_file import load_rig, save_rig
 from rsea_ros.nodes._run import NAMESPACE, Member
 from rsea_ros.nodes.record import TOPICS
+from rsea_ros.plugins import node_modules
 
-NODES = (
-    "controller", "driver", "excite", "experiment", "health", "identify", "model", "plant", "record",
-    "replay", "watch",
-)  # fmt: skip
+NODES = {name: module for name, module in node_modules().items() if name != "joint"}
 ENCODERS = "two_encoders.yaml"
 """A rig with an encoder on the spring whose torque can be controlled."""
 PARAMETERS: Mapping[str, Mapping[str, object]] = {
@@ -95,7 +93,7 @@ def _joints(joints: Sequence[str]) -> Profiles:
 
 def interfaces(name: str, **parameters: object) -> Interfaces:
     """Make a node and return the full names of its topics and services."""
-    component = importlib.import_module(f"rsea_ros.nodes.{name}").NODE
+    component = importlib.import_module(NODES[name]).NODE
     given = {**PARAMETERS.get(name, {}), **parameters}
     words = [w for key, value in given.items() for w in ("-p", f"{key}:={value}")]
     with rclpy.init(args=["--ros-args", *words]):

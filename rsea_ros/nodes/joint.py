@@ -9,7 +9,6 @@ from __future__ import annotations
 import importlib
 import sys
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 from rclpy.executors import Executor
@@ -20,16 +19,17 @@ from rsea_ros.documents.wording import did_you_mean
 from rsea_ros.errors import ParameterError
 from rsea_ros.nodes._health import STEADY
 from rsea_ros.nodes._run import BAD_INPUT, NAMESPACE, TICK, Component, Member, run_nodes
+from rsea_ros.plugins import node_modules
 
 USUAL = ("driver", "controller", "model")
 
 
 def component(kind: str) -> Component:
     """Return a kind of node by the name of its executable. Raises ParameterError where there is none."""
-    kinds = sorted(path.stem for path in Path(__file__).parent.glob("[!_]*.py") if path.stem != "joint")
+    kinds = {name: module for name, module in node_modules().items() if name != "joint"}
     if kind not in kinds:
         raise ParameterError(f"node {kind!r}, expected one of {', '.join(kinds)}{did_you_mean(kind, kinds)}")
-    found: Component = importlib.import_module(f"rsea_ros.nodes.{kind}").NODE
+    found: Component = importlib.import_module(kinds[kind]).NODE
     return found
 
 

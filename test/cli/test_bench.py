@@ -16,7 +16,6 @@ import yaml
 from bench.__main__ import _parser, _print, index, main as run_bench
 from bench.experiment.policies import Fixed
 from bench.experiment.score import LIMITS
-from bench.fleet.trends import DAYS, Wear, _joint
 from bench.frozen.cases import generated
 from bench.mutants import calls as callers
 from bench.results import read_lines, resumed, write_pages
@@ -26,7 +25,6 @@ from rsea_ros.experiment.campaign import Campaign
 from rsea_ros.experiment.proposal import DesignRequest
 from rsea_ros.hardware.peer.remote import RemoteBench
 from rsea_ros.model.rig_file import load_rig, rig_folders
-from rsea_ros.trends import alarms
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -181,12 +179,6 @@ def test_a_long_test_leaves_room_for_the_shorter_ones_behind_it(monkeypatch):
     assert callers.tests_of("laws/source", "f") == ([near, short], [])
     seconds[long] = 29.0
     assert callers.tests_of("laws/source", "f") == ([near, long], [])
-
-
-def test_spoilt_data_of_a_joint_of_the_simulated_fleet_raise_the_alarm():
-    wear = Wear("fault", since=100.0, fault="outliers")
-    history, recordings = _joint("J01", wear, np.full(DAYS, 25.0), np.random.default_rng(1))
-    assert "J01/outliers/fault" in [alarm.key for alarm in alarms(history, recordings)]
 
 
 def test_a_piece_of_a_fixed_command_is_a_run_of_a_campaign():

@@ -69,7 +69,7 @@ def test_the_first_compilation_is_said_once_on_a_terminal(tmp_path, monkeypatch,
             assert compiler.njit(cache=True)(lambda x: 2 * x)(3) == 6
         return 0
 
-    monkeypatch.setattr("rsea_ros.cli.main._run", lambda name, words: verb(words))
+    monkeypatch.setattr("rsea_ros.cli.main._run", lambda name, module, words: verb(words))
     assert main(["rigs"]) == 0
     said = "rsea: compiling the simulation for this machine: up to a minute, once\n"
     assert errors.getvalue() == (said if tty else "")

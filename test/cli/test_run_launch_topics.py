@@ -19,16 +19,17 @@ from rsea_ros import processes
 from rsea_ros.cli import main as cli, run
 from rsea_ros.cli.call import offer_of
 from rsea_ros.cli.launch import node_calls, together
-from rsea_ros.cli.run import node_names, ros_arguments
+from rsea_ros.cli.run import ros_arguments
 from rsea_ros.errors import ParameterError
 from rsea_ros.nodes import _visitor
+from rsea_ros.plugins import node_modules
 
 ROOT = Path(__file__).resolve().parents[2]
 
 
 def test_every_node_of_the_graph_exists():
     content = yaml.safe_load((ROOT / "launch" / "graph.yaml").read_text())
-    assert {*content["first"], *content["others"]} <= set(node_names())
+    assert {*content["first"], *content["others"]} <= set(node_modules())
 
 
 def test_a_graph_starts_its_first_node_and_the_requested_ones():

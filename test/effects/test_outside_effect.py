@@ -9,6 +9,7 @@ from effect_bench import RIG, command
 from runs import trying
 from similar_machine import record_with
 
+from rsea_ros.cli.export import exporter
 from rsea_ros.control.compensation import compensation
 from rsea_ros.control.law import responses, sample_rig
 from rsea_ros.control.uncertainty import lag_responses
@@ -16,9 +17,6 @@ from rsea_ros.diagnosis.candidate import with_clocks_in_delays
 from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.diagnosis.naming.conclusion import undetermined_play
 from rsea_ros.effects.catalogue import catalogue, effect_named
-from rsea_ros.exports.bam import export_bam
-from rsea_ros.exports.mjcf import export_mjcf
-from rsea_ros.exports.urdf import export_urdf
 from rsea_ros.identification.fit import unknowns_of
 from rsea_ros.identification.identify import identify
 from rsea_ros.identification.problem import Problem, case_from
@@ -28,6 +26,7 @@ from rsea_ros.laws.choice import fitted_base
 from rsea_ros.model.observer.assemble import without_delay
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
+from rsea_ros.plugins import TARGETS, in_extras
 from rsea_ros.records.record import MEASURED
 from rsea_ros.report.diagnosis.figures import part_of
 
@@ -134,11 +133,11 @@ def test_a_law_is_searched_beside_an_outside_effect(record):
     assert base.solution.values["paddle.coefficient"] == pytest.approx(8.0, rel=0.1)
 
 
-@pytest.mark.parametrize("export", [export_mjcf, export_urdf, export_bam], ids=lambda e: e.__name__)
-def test_an_export_says_that_it_leaves_an_outside_effect_out(export):
-    rig = load_rig("pendulum" if export is export_bam else "paper_moving_output")
-    exported = export(rig.with_effect("paddle", **SIZE))
-    assert "paddle" in exported.leaves_out
+@pytest.mark.parametrize("target", ["mjcf", *in_extras(TARGETS)])
+def test_an_export_says_what_becomes_of_an_outside_effect(target):
+    rig = load_rig("pendulum" if target in ("bam", "isaac") else "paper_moving_output")
+    exported = exporter(target)(rig.with_effect("paddle", **SIZE))
+    assert ("paddle" in exported.leaves_out) == (target != "fmu") == ("paddle" not in exported.says), target
 
 
 def test_the_controller_compensates_an_outside_effect_by_the_law_of_the_step():

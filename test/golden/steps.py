@@ -17,6 +17,8 @@ from fleet_histories import cause, history, recordings
 from written import rounded, short, sums, text_of
 
 import rsea_ros as rsea
+from rsea_extras.pages.page import write_fleet_report
+from rsea_ros.cli.export import exporter
 from rsea_ros.cli.main import verbs
 from rsea_ros.diagnosis.settings import DEFAULT
 from rsea_ros.effects.catalogue import catalogue
@@ -28,7 +30,6 @@ from rsea_ros.laws.effect_source import LawProvenance, source_of
 from rsea_ros.laws.law import FittedTerm, Law, LearntCurve
 from rsea_ros.model.rig_file import packaged_names, rig_text
 from rsea_ros.nodes._policies import NODES
-from rsea_ros.report.fleet.page import write_fleet_report
 
 RIG = "paper_high_impedance"
 DRAGS = ("quadratic_drag", "load_dependent_friction", "asymmetric_friction", "damping_drift", "torque_ripple")
@@ -245,8 +246,8 @@ def few_days(folder: Path) -> Iterator[str]:
 def helps(folder: Path) -> Iterator[str]:
     """Yield the options of every verb, without the layout of argparse; what several share, once."""
     seen = set[str]()
-    for name, path in verbs().items():
-        verb = importlib.import_module(f"rsea_ros.cli.{path.stem}")
+    for name, module in verbs().items():
+        verb = importlib.import_module(module)
         parser = argparse.ArgumentParser(prog=name)
         verb.add_arguments(parser)
         yield f"{name}: {verb.HELP} | {verb.EXAMPLE}"
@@ -256,8 +257,8 @@ def helps(folder: Path) -> Iterator[str]:
 
 def nodes(folder: Path) -> Iterator[str]:
     """Yield what every node prints with --help: its parameters with their ranges and defaults."""
-    for name in NODES:
-        node = importlib.import_module(f"rsea_ros.nodes.{name}")
+    for name, module in NODES.items():
+        node = importlib.import_module(module)
         sys.argv = [name, "--help"]
         with redirect_stdout(StringIO()) as out:
             assert node.main() == 0
@@ -271,11 +272,11 @@ def exports(folder: Path) -> Iterator[str]:
     for name in catalogue():
         rigs[name] = (rigs["pendulum"] if name == "gravity_error" else base).with_effect(name)
     for target in ("mjcf", "urdf", "sdf", "isaac", "bam", "feedforward"):
-        module = importlib.import_module(f"rsea_ros.exports.{'urdf' if target == 'sdf' else target}")
+        export = exporter(target)
         seen = set[str]()
         for name, rig in rigs.items():
             try:
-                made = getattr(module, f"export_{target}")(rig)
+                made = export(rig)
             except RseaError as error:
                 yield f"{target} of {name}: {error}"
                 continue

@@ -17,6 +17,7 @@ from rclpy.lifecycle import LifecycleNode
 from msg_adapters.ros import Trigger
 from rsea_ros.nodes import driver
 from rsea_ros.nodes._run import PROFILE
+from rsea_ros.plugins import node_modules
 from test.nodes.warm import parent
 
 try:  # a message costs half as much of the processor
@@ -48,7 +49,7 @@ class Process:
         environment = {**os.environ, **quick, "PYTHONPATH": str(ROOT), "ROS_LOG_DIR": str(log.parent / "ros")}
         log.touch()
         files = os.devnull, log, log
-        module = name if (HERE / f"{name}.py").is_file() else f"rsea_ros.nodes.{name}"
+        module = name if (HERE / f"{name}.py").is_file() else node_modules()[name]
         self._process = parent().start(module, ["--ros-args", *words], environment, files)
 
     @property

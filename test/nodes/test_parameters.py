@@ -13,14 +13,12 @@ import yaml
 from rsea_ros.errors import ParameterError
 from rsea_ros.nodes import _parameters
 from rsea_ros.nodes._parameters import DERIVED, NodeParameter, _descriptor, _refuse_unknown, stated_limits
+from rsea_ros.plugins import node_modules
 from rsea_ros.processes import ENDING
 from test.nodes.conftest import as_argument
 
 CONFIG = Path(__file__).resolve().parents[2] / "config" / "nodes"
-NODES = (
-    "controller", "driver", "excite", "experiment", "health", "identify", "model", "plant", "record",
-    "replay", "watch",
-)  # fmt: skip
+NODES = {name: module for name, module in node_modules().items() if name != "joint"}
 RATE = NodeParameter("rate", 280.0, "samples a second", "Hz", 10.0, 1000.0)
 COUNT = NodeParameter("count", 3, "how many", "", 0, 10)
 KIND = NodeParameter("kind", "a", "which", choices=("a", "b"))
@@ -54,9 +52,9 @@ def test_a_value_that_fits_comes_in_its_type():
 
 
 def test_parameter_file_and_table_agree():
-    for name in NODES:
+    for name, module in NODES.items():
         document = yaml.safe_load((CONFIG / f"{name}.yaml").read_text())
-        table = importlib.import_module(f"rsea_ros.nodes.{name}").TABLE
+        table = importlib.import_module(module).TABLE
         assert document["/**"]["ros__parameters"] == {p.name: p.default for p in table}, name
         for parameter in table:
             assert parameter.check(parameter.default) == parameter.default
@@ -105,11 +103,11 @@ def signals():
             signal.signal(number, action)
 
 
-@pytest.mark.parametrize("name", sorted(WRONG.keys() - set(PROCESSES)))
+@pytest.mark.parametrize("name", sorted((WRONG.keys() & NODES.keys()) - set(PROCESSES)))
 def test_every_node_refuses_what_is_wrong_in_one_line_with_status_2(name, signals, monkeypatch, capfd):
     words = [w for key, value in WRONG[name][0].items() for w in ("-p", f"{key}:={as_argument(value)}")]
     monkeypatch.setattr(sys, "argv", [name, "--ros-args", *words])
-    assert importlib.import_module(f"rsea_ros.nodes.{name}").main() == 2
+    assert importlib.import_module(NODES[name]).main() == 2
     assert_refused(name, "".join(capfd.readouterr()).splitlines())
 
 

@@ -18,12 +18,12 @@ from rsea_ros.nodes._policies import NODES
 from rsea_ros.nodes._waiter import Pulse, anything_to_do
 
 
-@pytest.mark.parametrize("name", NODES)
-def test_a_node_is_a_program(name, monkeypatch, capsys):
+@pytest.mark.parametrize(("name", "module"), NODES.items())
+def test_a_node_is_a_program(name, module, monkeypatch, capsys):
     monkeypatch.setattr(sys, "argv", [name, "--help"])
     with warnings.catch_warnings(), pytest.raises(SystemExit) as left:
         warnings.simplefilter("ignore", RuntimeWarning)  # it has been imported before, and runs once more
-        runpy.run_module(f"rsea_ros.nodes.{name}", run_name="__main__")
+        runpy.run_module(module, run_name="__main__")
     assert left.value.code == 0
     assert capsys.readouterr().out.startswith(f"usage: ros2 run rsea_ros {name} ")
 

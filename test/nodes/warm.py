@@ -33,9 +33,6 @@ MODULES = (
     "rsea_ros.experiment.campaign", "msg_adapters",
 )  # fmt: skip
 """What most of a node's time to import goes to."""
-NODES = (
-    "driver", "controller", "plant", "experiment", "identify", "excite", "replay", "record", "model", "watch",
-)  # fmt: skip
 FLAGS = os.O_RDONLY, os.O_WRONLY | os.O_APPEND, os.O_WRONLY | os.O_APPEND
 """How a child opens its standard streams."""
 
@@ -132,7 +129,7 @@ def serve(folder: Path) -> None:
     signal.signal(signal.SIGCHLD, reap)
     for line in sys.stdin:
         wish = json.loads(line)
-        if wish["module"].startswith("rsea_ros.nodes."):
+        if wish["module"].startswith(("rsea_ros.nodes.", "rsea_extras.watch.")):
             prepare()
         signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGCHLD])
         pid = os.fork()
@@ -173,6 +170,7 @@ def prepare() -> None:
     from rsea_ros.experiment.run_shape import RunLimits
     from rsea_ros.model.rig_file import load_rig
     from rsea_ros.model.simulation import synthesize
+    from rsea_ros.plugins import node_modules
     from rsea_ros.records.record import Channel
 
     rig, asked = load_rig("paper_high_impedance"), DesignRequest(RunLimits(torque=8.0), longest=0.5)
@@ -181,8 +179,8 @@ def prepare() -> None:
     Campaign(rig, ["current_loop_lag"], asked, lambda proposal: None).go([record])
     threads = len(list(Path("/proc/self/task").iterdir()))
     assert threads == 1, f"{threads} threads, of which a fork has one"
-    for name in NODES:  # with ROS, whose tracer (lttng-ust) starts two threads that wait for ever
-        importlib.import_module(f"rsea_ros.nodes.{name}")
+    for module in node_modules().values():  # with ROS, whose tracer starts two threads that wait for ever
+        importlib.import_module(module)
     hurry_reports()
 
 

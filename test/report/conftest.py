@@ -25,7 +25,7 @@ from rsea_ros.model.simulation import simulate, synthesize
 from rsea_ros.model.transfer import frequency_response
 from rsea_ros.records.record import Channel, Record
 from rsea_ros.report.diagnosis.page import write_diagnosis
-from test.watch.browser import Browser
+from test.report.browser import Browser
 
 DURATION, RATE = 160.0, 280.0
 

@@ -1,0 +1,1 @@
+"""Targets of `rsea export` beyond MJCF, one a file."""
