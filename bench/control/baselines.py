@@ -203,20 +203,18 @@ def ours(rig: Rig, rate: float, gains: Gains) -> Step:
     return lambda ft, velocity, r: controller.step(Measurement(ft, velocity, 0.0), r)
 
 
-def baselines(rig: Rig, free: Rig, rates: Sequence[float]) -> Iterator[Row | str]:
+def baselines(rig: Rig, free: Rig, rate: float) -> Iterator[Row | str]:
     """Print the gains of each, and its error of 5 Hz on each bench, %; some minutes a rate."""
-    loads = load_range(rig, free)
-    for rate in rates:
-        made: dict[str, Callable[[], Step]] = {}
-        for name in METHODS:
-            x = tune(name, rig, loads, rate)
-            yield f"{rate:g} Hz, {name}: {', '.join(f'{value:.3g}' for value in x) or 'no gains'}"
-            made[name] = partial(METHODS[name][0], rig, 1.0 / rate, x)
-        made["this project's"] = partial(ours, rig, rate, design(rig, loads, rate).gains)
-        for name, begin in made.items():
-            cells = {}
-            for where, case in cases().items():
-                amplitude = amplitude_of(variant_rig(loads[case.load], case))
-                error = error_of(begin(), disturbed_rig(loads, case), rate, amplitude, case.samples)
-                cells[where] = f"{100.0 * error:.1f}" if error < UNSTABLE else "unstable"
-            yield Row(name, "", cells)
+    loads, made = load_range(rig, free), dict[str, Callable[[], Step]]()
+    for name in METHODS:
+        x = tune(name, rig, loads, rate)
+        yield f"{rate:g} Hz, {name}: {', '.join(f'{value:.3g}' for value in x) or 'no gains'}"
+        made[name] = partial(METHODS[name][0], rig, 1.0 / rate, x)
+    made["this project's"] = partial(ours, rig, rate, design(rig, loads, rate).gains)
+    for name, begin in made.items():
+        cells = {}
+        for where, case in cases().items():
+            amplitude = amplitude_of(variant_rig(loads[case.load], case))
+            error = error_of(begin(), disturbed_rig(loads, case), rate, amplitude, case.samples)
+            cells[where] = f"{100.0 * error:.1f}" if error < UNSTABLE else "unstable"
+        yield Row(name, "", cells)

@@ -10,7 +10,7 @@ and users (docs/baselines.md). Through real nodes: `driver controller`.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator
 from typing import Annotated
 
 import numpy as np
@@ -31,50 +31,43 @@ from rsea_ros.model.rig_file import load_rig
 SWEEP = np.array([0.5, 1.0, 2.0, 3.0, 5.0, 7.0, 10.0, 15.0, 20.0, 30.0, 45.0])
 
 
-def trials(rig: Rig, free: Rig, rates: Sequence[float]) -> Iterator[str]:
-    """Sweep the set densely, and follow the sine on its corners; `rsea control` prints the requirements."""
+def trials(rig: Rig, free: Rig, rate: float) -> Iterator[str]:
+    """Sweep the set densely, and follow the sine with each load on its corners: the worst of each load."""
     loads = load_range(rig, free)
-    for designed in designs(rig, loads, rates):
-        yield f"{designed.rate:g} Hz: {designed.gains}"
-        swept = robustness(loads[LOCKED], loads, designed)
-        m = swept.margins
-        yield (
-            f"{designed.rate:g} Hz, {designed.uncertainty}, {swept.cases} benches, "
-            f"{swept.unstable} unstable: "
-            f"least phase margin {m.phase:.1f} deg, gain {m.gain:.1f} dB, delay {m.delay:.2f} samples, "
-            f"|S| {swept.sensitivity:.2f} ({swept.where})"
-        )
-        yield from follow_sine(loads, designed)
-
-
-def follow_sine(loads: Mapping[str, Rig], designed: ControllerDesign) -> Iterator[str]:
-    """Follow the sine on the rig with each load and on every corner of the set: the worst of each load."""
+    designed = design(rig, loads, rate)
+    yield f"{rate:g} Hz: {designed.gains}"
+    swept = robustness(loads[LOCKED], loads, designed)
+    m = swept.margins
+    yield (
+        f"{rate:g} Hz, {designed.uncertainty}, {swept.cases} benches, {swept.unstable} unstable: "
+        f"least phase margin {m.phase:.1f} deg, gain {m.gain:.1f} dB, delay {m.delay:.2f} samples, "
+        f"|S| {swept.sensitivity:.2f} ({swept.where})"
+    )
     cases = corners(tuple(loads), designed.uncertainty)
     for load in loads:
         mine = (case for case in cases if case.load == load)
         each = {case: tracking_error(loads[LOCKED], loads, case, designed) for case in mine}
         worst = max(each, key=lambda case: each[case])
         yield (
-            f"{designed.rate:g} Hz, 5 Hz followed, {load}: {100.0 * each[BenchVariant(load)]:.2f} %, "
+            f"{rate:g} Hz, 5 Hz followed, {load}: {100.0 * each[BenchVariant(load)]:.2f} %, "
             f"worst of {len(each)} corners {100.0 * each[worst]:.2f} % ({worst})"
         )
 
 
-def unknown(rig: Rig, free: Rig, rates: Sequence[float]) -> Iterator[str]:
+def unknown(rig: Rig, free: Rig, rate: float) -> Iterator[str]:
     """Follow sines on the free load, which the controller does not know, at what the motor can do there."""
     loads = load_range(rig, free)
-    for designed in designs(rig, loads, rates):
-        share = link_share(rig, loads, designed)
-        for hz in (1.0, 2.0, 3.0, 4.0, 5.0, 7.0, 10.0):
-            most = min(10.0, 0.8 * largest(free, hz, motor_torque(rig)[0], math.inf))
-            errors = [
-                sine(free, lock(rig), designed, part * most, hz, span=LEARNED, link=link)
-                for link in (None, share)
-                for part in (1.0, 0.3)
-            ]
-            cells = ", ".join(f"{100.0 * error:.1f}" for error in errors)
-            label = f"{designed.rate:g} Hz, {hz:g} Hz, {most:.1f} N·m"
-            yield f"{label}: error {cells} % (all, 0.3 of it; with link)"
+    designed = design(rig, loads, rate)
+    share = link_share(rig, loads, designed)
+    for hz in (1.0, 2.0, 3.0, 4.0, 5.0, 7.0, 10.0):
+        most = min(10.0, 0.8 * largest(free, hz, motor_torque(rig)[0], math.inf))
+        errors = [
+            sine(free, lock(rig), designed, part * most, hz, span=LEARNED, link=link)
+            for link in (None, share)
+            for part in (1.0, 0.3)
+        ]
+        cells = ", ".join(f"{100.0 * error:.1f}" for error in errors)
+        yield f"{rate:g} Hz, {hz:g} Hz, {most:.1f} N·m: error {cells} % (all, 0.3 of it; with link)"
 
 
 def over_spring(rig: Rig, designed: ControllerDesign, z: np.ndarray) -> str:
@@ -84,40 +77,35 @@ def over_spring(rig: Rig, designed: ControllerDesign, z: np.ndarray) -> str:
     return f"|Z| over the spring's {', '.join(cells)}"
 
 
-def with_link(rig: Rig, free: Rig, rates: Sequence[float]) -> Iterator[str]:
+def with_link(rig: Rig, free: Rig, rate: float) -> Iterator[str]:
     """Print the output impedance without and with an encoder on the link."""
     loads = load_range(rig, free)
-    for designed in designs(rig, loads, rates):
-        share = link_share(rig, loads, designed)
-        yield f"{designed.rate:g} Hz: {share}"
-        benches = linked_set(rig, loads, designed)
-        for name, link in (("without", LinkShare()), ("with", share)):
-            z = measure_impedance(rig, designed, Virtual(0.0, 0.0), SWEEP, link)
-            most = benches.sensitivity(link).max()
-            yield f"{name}: {over_spring(rig, designed, z)}; largest |S| of the set {most:.2f}"
+    designed = design(rig, loads, rate)
+    share = link_share(rig, loads, designed)
+    yield f"{rate:g} Hz: {share}"
+    benches = linked_set(rig, loads, designed)
+    for name, link in (("without", LinkShare()), ("with", share)):
+        z = measure_impedance(rig, designed, Virtual(0.0, 0.0), SWEEP, link)
+        most = benches.sensitivity(link).max()
+        yield f"{name}: {over_spring(rig, designed, z)}; largest |S| of the set {most:.2f}"
 
 
-def outer(rig: Rig, free: Rig, rates: Sequence[float]) -> Iterator[str]:
+def outer(rig: Rig, free: Rig, rate: float) -> Iterator[str]:
     """State the passive range of the outer loop, and measure it with a human-like load."""
-    for designed in designs(rig, load_range(rig, free), rates):
-        for damping in (0.0, 2.0, 5.0):
-            most = stiffest(rig, designed, damping, 20.0)
-            to = passive_to(rig, designed, Virtual(0.9 * most, damping))
-            yield (
-                f"{designed.rate:g} Hz, D_v {damping:g}: Re Z > 0 to 20 Hz for K_v <= {most:.0f} N·m/rad; "
-                f"0.9 of that to {to:.0f} Hz"
-            )
-        for virtual in (Virtual(0.0, 0.0), Virtual(200.0, 2.0)):
-            z = measure_impedance(rig, designed, virtual, SWEEP)
-            yield f"{virtual}: {over_spring(rig, designed, z)}; least Re Z {z.real.min():.1f}"
+    designed = design(rig, load_range(rig, free), rate)
+    for damping in (0.0, 2.0, 5.0):
+        most = stiffest(rig, designed, damping, 20.0)
+        to = passive_to(rig, designed, Virtual(0.9 * most, damping))
+        yield (
+            f"{rate:g} Hz, D_v {damping:g}: Re Z > 0 to 20 Hz for K_v <= {most:.0f} N·m/rad; "
+            f"0.9 of that to {to:.0f} Hz"
+        )
+    for virtual in (Virtual(0.0, 0.0), Virtual(200.0, 2.0)):
+        z = measure_impedance(rig, designed, virtual, SWEEP)
+        yield f"{virtual}: {over_spring(rig, designed, z)}; least Re Z {z.real.min():.1f}"
 
 
-def designs(rig: Rig, loads: Mapping[str, Rig], rates: Sequence[float]) -> list[ControllerDesign]:
-    """Return the design at each rate."""
-    return [design(rig, loads, rate) for rate in rates]
-
-
-SECTIONS: dict[str, Callable[[Rig, Rig, Sequence[float]], Iterator[Row | str]]] = {
+SECTIONS: dict[str, Callable[[Rig, Rig, float], Iterator[Row | str]]] = {
     "trials": trials, "free": unknown, "impedance": outer, "link": with_link,
     "baselines": baselines, "users": users,
 }  # fmt: skip
@@ -134,4 +122,5 @@ def main(
     """
     for name in sections or SECTIONS:
         yield f"\n{name}"
-        yield from SECTIONS[name](load_rig(rig), load_rig(free), rate)
+        for hz in rate:
+            yield from SECTIONS[name](load_rig(rig), load_rig(free), hz)

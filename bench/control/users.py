@@ -21,10 +21,9 @@ import numpy as np
 from numba import njit
 from scipy.optimize import minimize
 
-from bench.control.baselines import Step, Values, paine, pratt_williamson
+from bench.control.baselines import Step, Values, none, ours, paine, pratt_williamson
 from bench.results import Row
-from rsea_ros.control.controller import Measurement, TorqueController
-from rsea_ros.control.law import FT, Gains, z_of
+from rsea_ros.control.law import FT, z_of
 from rsea_ros.control.margins import encirclements
 from rsea_ros.control.synthesis import HEAVY, DesignLimits, design, grid
 from rsea_ros.control.uncertainty import assumed, corners, family, load_range, lock
@@ -312,36 +311,25 @@ def holding(method: Callable[[Rig, float, Values], Step], rig: Rig, h: float, x:
     return step
 
 
-def ours(rig: Rig, rate: float, gains: Gains) -> Callable[[], Step]:
-    """Return this project's controller as the others are called."""
-
-    def begin() -> Step:
-        controller = TorqueController(rig, rate, gains)
-        return lambda ft, velocity, r: controller.step(Measurement(ft, velocity, 0.0), r)
-
-    return begin
-
-
 PD = ((60.0, 1.0, 0.01), (300.0, 5.0, 0.05), (100.0, 10.0, 0.1))
 DOB = tuple((*x, q, part) for x in PD for q, part in ((6.0, 0.5), (40.0, 0.9)))
 """Gains at which the searches of the textbook controllers begin."""
 
 
-def users(rig: Rig, free: Rig, rates: Sequence[float]) -> Iterator[Row | str]:
-    """Print the users' first experiments at each rate."""
-    for rate in rates:
-        pd, dob = textbook(rig, free, rate, PD), textbook(rig, free, rate, DOB)
-        for name, x in (("PD", pd), ("PD + DOB", dob)):
-            yield f"{rate:g} Hz, {name}: {', '.join(f'{value:.3g}' for value in x)}"
-        gains = design(rig, load_range(rig, free), rate).gains
-        made: dict[str, Callable[[], Step]] = {
-            "no controller": lambda: lambda ft, velocity, r: r,
-            "PD + feed-forward": partial(holding, pratt_williamson, rig, 1.0 / rate, pd),
-            "PD + feed-forward + DOB": partial(holding, paine, rig, 1.0 / rate, dob),
-            "this project's": ours(lock(rig), rate, gains),
-        }
-        for what, experiment in rows(rig, rate).items():
-            yield Row(f"{what}, {rate:g} Hz", "", {n: _text(experiment(begin)) for n, begin in made.items()})
+def users(rig: Rig, free: Rig, rate: float) -> Iterator[Row | str]:
+    """Print the users' first experiments at a rate."""
+    pd, dob = textbook(rig, free, rate, PD), textbook(rig, free, rate, DOB)
+    for name, x in (("PD", pd), ("PD + DOB", dob)):
+        yield f"{rate:g} Hz, {name}: {', '.join(f'{value:.3g}' for value in x)}"
+    gains = design(rig, load_range(rig, free), rate).gains
+    made: dict[str, Callable[[], Step]] = {
+        "no controller": partial(none, rig, 1.0 / rate, ()),
+        "PD + feed-forward": partial(holding, pratt_williamson, rig, 1.0 / rate, pd),
+        "PD + feed-forward + DOB": partial(holding, paine, rig, 1.0 / rate, dob),
+        "this project's": partial(ours, lock(rig), rate, gains),
+    }
+    for what, experiment in rows(rig, rate).items():
+        yield Row(f"{what}, {rate:g} Hz", "", {n: _text(experiment(begin)) for n, begin in made.items()})
 
 
 def _text(value: float) -> str:
