@@ -132,13 +132,13 @@ def spring_mode(rig: Rig) -> float:
 def as_seen(rig: Rig, records: Sequence[Record]) -> Rig:
     """Return a rig with a rigid spring where the output drifts freely and no record can show the spring.
 
-    Its mode lies above the rate at which all records were sampled, and no deflection was measured. Rotor and
-    load turn as one; a simulation from the commands alone would run away, the torque along the motion tells.
+    Its mode lies above the rate at which all were sampled, and neither deflection nor F/T was measured. Rotor
+    and load turn as one; a simulation from commands alone would run away, the torque along the motion tells.
     """
     free = rig.clamped == frozenset({"housing_end"}) and not rig["spring_end.stiffness"]
     if rig.rigid_spring or rig.loop is not None or rig.motion != "simulated" or rig.conditions or not free:
         return rig
-    if not all("position" in r and "deflection" not in r for r in records):
+    if not all("position" in r and not {"deflection", "ft"} & r.channels.keys() for r in records):
         return rig
     if spring_mode(rig) < max(c.rate for r in records for c in r.channels.values() if len(c) > 1):
         return rig

@@ -14,7 +14,7 @@ from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.identification.identify import identify
 from rsea_ros.identification.problem import case_from
-from rsea_ros.model.inverse import motion_from, noise_along, torques_along
+from rsea_ros.model.inverse import as_seen, motion_from, noise_along, spring_mode, torques_along
 from rsea_ros.model.rig import Rig, Sensor
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.records.record import Channel, Record
@@ -127,3 +127,25 @@ def test_ripple_is_looked_for_along_the_angle_that_the_torque_of_a_held_spring_s
     first = ripples(case, rig, nominal)[0]
     travel = rig["gear.ratio"] * np.ptp(run["ft"].y) / rig["spring.stiffness"]
     assert abs(first["cycles_per_revolution"] - 3.0) * travel < 0.5 * 2.0 * np.pi
+
+
+STIFF = """
+name: joint
+housing_end: {clamped: true}
+spring_end: {inertia: {value: 0.02, unit: kg m^2}}
+rotor: {reflected_inertia: {value: 0.02, unit: kg m^2}, reflected_damping: {value: 0.2, unit: N m s/rad}}
+gear: {ratio: {value: 40, unit: "1"}, train: lumped}
+spring: {stiffness: {value: %s, unit: N m/rad}, damping: {value: 2.0, unit: N m s/rad}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("stiffness", "beside", "is_rigid"), ((2000.0, (), True), (100.0, (), False), (2000.0, ("ft",), False))
+)
+def test_a_spring_that_no_record_can_show_is_rigid(tmp_path, stiffness, beside, is_rigid):
+    """On 2000 N m/rad two inertias of 0.02 swing at 71 Hz, on 100 at 16; logged at 33. F/T shows it."""
+    (tmp_path / "joint.yaml").write_text(STIFF % stiffness)
+    rig, t = load_rig(str(tmp_path / "joint.yaml")), np.arange(100) / 33.0
+    run = Record({n: Channel(t, np.sin(t)) for n in ("command", "position", *beside)})
+    assert spring_mode(rig) == pytest.approx(np.sqrt(stiffness * 100.0) / (2.0 * np.pi), rel=1e-3)
+    assert as_seen(rig, [run]).rigid_spring == is_rigid
