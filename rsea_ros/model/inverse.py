@@ -69,7 +69,7 @@ class Motion:
     each of several parts of a sample; empty where the torque was measured. Of a rig whose output is moved:
     ft, torque of the F/T sensor (N m); d, d_rate, the spring's deflection (rad, rad/s); empty where not
     measured. white: RMS of the noise of each channel, before the filter, in its unit. corner: Hz, above which
-    the noise of the position hides torques.
+    the noise of the position hides torques. parts: of the samples, between gaps.
     """
 
     t: FloatArray
@@ -84,6 +84,7 @@ class Motion:
     d_rate: FloatArray = field(default_factory=_nothing)
     white: Mapping[str, float] = field(default_factory=dict)
     corner: float = math.inf
+    parts: tuple[slice, ...] = (slice(None),)
 
     @property
     def judged(self) -> dict[str, FloatArray]:
@@ -96,7 +97,10 @@ class Motion:
 
         Of an inertia the noise rises with the square of the frequency, and would hide what is slow.
         """
-        return _behind_corner(torque, self.corner, float(self.t[1] - self.t[0]))
+        period, torque = float(self.t[1] - self.t[0]), torque.copy()
+        for part in self.parts:
+            torque[part] = _behind_corner(torque[part], self.corner, period)
+        return torque
 
     def with_noise(self, rig: Rig, white: Mapping[str, float]) -> Motion:
         """Return the motion with the noise of its channels; a rig's inertia makes the corner of it."""
@@ -184,9 +188,10 @@ def motion_from(record: Record, rig: Rig | None = None) -> Motion:
     t = np.arange(position.t[0], position.t[-1] + 0.5 * step, step)
     q, torques = np.interp(t, position.t, position.y), _possible_torques(record, t, bool(beside))
     v, a = np.zeros(len(t)), np.zeros(len(t))
-    counts, shown = np.zeros(len(t), bool), {n: np.zeros(len(t)) for n in beside}
+    counts, shown, parts = np.zeros(len(t), bool), {n: np.zeros(len(t)) for n in beside}, []
     for begin, end in _sampled_spans(record, float(t[0]), float(t[-1])):
         part = slice(*np.searchsorted(t, [begin - 0.5 * step, end + 0.5 * step]))
+        parts.append(slice(math.ceil(part.start / finer), math.ceil(part.stop / finer)))
         known = position.between(begin, end + 0.5 * step)
         q[part] = smooth(CubicSpline(known.t, known.y)(t[part]), step)
         v[part] = np.gradient(q[part], step)
@@ -207,7 +212,7 @@ def motion_from(record: Record, rig: Rig | None = None) -> Motion:
     moves = counts & ~_at_rest(np.interp(t, position.t, position.y), noise, period)
     counts = moves if np.count_nonzero(moves) >= FEWEST else counts
     torque = _likeliest(torques, [a, v, np.sign(v), np.ones(len(t)), ft if len(ft) else d], counts)
-    return Motion(t, q, v, a, torque, counts, command, ft, d, np.asarray(rate[::finer]))
+    return Motion(t, q, v, a, torque, counts, command, ft, d, np.asarray(rate[::finer]), parts=tuple(parts))
 
 
 def _possible_torques(record: Record, t: FloatArray, is_moved: bool) -> list[FloatArray]:
@@ -248,7 +253,7 @@ def _at_rest(position: FloatArray, noise: float, period: float) -> BoolArray:
     """
     from scipy.ndimage import binary_dilation, maximum_filter1d, minimum_filter1d
 
-    width = 2 * math.ceil(1.0 / (CUT_OFF * period)) + 1
+    width = 2 * round(1.0 / (CUT_OFF * period)) + 1
     travel = maximum_filter1d(position, width) - minimum_filter1d(position, width)
     return np.asarray(binary_dilation(travel <= _RANGE * noise, np.ones(width, bool)), bool)
 

@@ -30,6 +30,7 @@ SAID = {
     Remark("differs", ("cold", "spring.damping = 3 N m s/rad", "no backlash")): "cold differs as stated: "
     "spring.damping = 3 N m s/rad and no backlash.",
     Remark("other_records", ("warm", "hot")): "Nothing was fitted to warm and hot, of which the rig has",
+    Remark("unseen_spring", values=(71.2, 33.0)): "The mode of rotor and load on the spring, 71.2 Hz",
     Remark("lost_cycles", values=(108.0,)): "108 lost cycles of the driver are a likely cause",
     Remark("stretches", values=(160.1, 600.0), unit="s"): "on 160 s of the 600 s recorded:",
 }
