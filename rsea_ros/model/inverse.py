@@ -107,9 +107,11 @@ class Motion:
         level = max(white.get("motor_torque", 0.0), _TORQUE_TRUST * float(np.std(self.torque)))
         inertia = float(_as_one_part(rig)[1].mass[0, 0])
         corner = math.sqrt(level / max(inertia * white["position"], 1e-300)) / (2.0 * math.pi)
-        return replace(self, white=white, corner=corner if corner < CUT_OFF else math.inf)
+        return replace(self, white=white, corner=max(corner, _SLOWEST) if corner < CUT_OFF else math.inf)
 
 
+_SLOWEST = 4.0
+"""Hz. A lower corner would remember longer than half a block of a quarter of a second, judged by itself."""
 _TORQUE_TRUST = 0.01
 """Of a torque's RMS: a smaller error of the slow torque is not worth the fast ones."""
 
