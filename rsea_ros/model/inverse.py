@@ -60,7 +60,6 @@ def _nothing() -> FloatArray:
     return np.empty(0)
 
 
-
 @dataclass(frozen=True)
 class Motion:
     """A measured motion on a uniform grid, filtered: t (s), q (rad), v (rad/s), a (rad/s^2), torque (N m).
@@ -121,7 +120,7 @@ def _behind_corner(values: FloatArray, corner: float, period: float) -> FloatArr
 
     if math.isinf(corner):
         return values
-    return np.asarray(filtfilt(*butter(1, corner * 2.0 * period), values))
+    return np.asarray(filtfilt(*butter(1, min(corner * 2.0 * period, 0.8)), values))
 
 
 def is_inverse(rig: Rig) -> bool:

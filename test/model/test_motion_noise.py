@@ -75,6 +75,15 @@ def test_the_noise_along_a_motion_is_the_scatter_of_many_readings_of_it(torque):
     assert noise_along(rig, motion)["motor_torque"] == pytest.approx(scatter, rel=0.1)
 
 
+@pytest.mark.parametrize("rate", (12.0, 33.0, 1000.0))
+def test_a_slow_log_has_a_corner_below_half_its_rate(rate):
+    rig, t = pendulum_rig(), np.arange(400) / rate
+    motion = motion_from(Record({n: Channel(t, np.sin(t)) for n in ("command", "position")}), rig)
+    for noise in (1e-5, 1e-4, 1e-3):
+        judged = motion.with_noise(rig, {"position": noise}).judged["motor_torque"]
+        assert np.isfinite(judged).all()
+
+
 @pytest.mark.parametrize(("late", "named"), ((0.0, ()), (0.006, ("command_delay",))))
 def test_a_bare_drive_of_plain_python_is_at_its_noise_and_its_late_command_a_delay(late, named):
     """Flawless it was 1.9 times its noise, and the delay an overshoot, which undoing had made of it."""
