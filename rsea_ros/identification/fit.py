@@ -48,17 +48,15 @@ from rsea_ros.identification.unknowns import (
     vector_of,
     with_effect,
 )
-from rsea_ros.model.inverse import as_seen, is_inverse, spring_mode
+from rsea_ros.model.inverse import as_seen, is_inverse
 from rsea_ros.model.rig import Rig
 from rsea_ros.records.record import MEASURED, BoolArray, Channel, FloatArray, Record
 
 
 def as_recorded(rig: Rig, records: Sequence[Record]) -> tuple[Rig, tuple[Remark, ...]]:
     """Return a rig with no spring that no record could show, and the remark that says so."""
-    seen = as_seen(rig, records)
-    rates = [c.rate for r in records for c in r.channels.values() if len(c) > 1]
-    remark = Remark("unseen_spring", values=(spring_mode(rig), max(rates))) if seen is not rig else None
-    return seen, () if remark is None else (remark,)
+    seen, numbers = as_seen(rig, records)
+    return seen, (Remark("unseen_spring", values=numbers),) if numbers else ()
 
 
 def misfit_ratios(solution: Solution) -> dict[str, float]:

@@ -134,21 +134,24 @@ def spring_mode(rig: Rig) -> float:
     return math.sqrt(rig["spring.stiffness"] * sum(1.0 / inertia for inertia in inertias)) / (2.0 * math.pi)
 
 
-def as_seen(rig: Rig, records: Sequence[Record]) -> Rig:
+def as_seen(rig: Rig, records: Sequence[Record]) -> tuple[Rig, tuple[float, ...]]:
     """Return a rig with a rigid spring where the output drifts freely and no record can show the spring.
+
+    Then also the spring's mode and the highest rate of the records, Hz.
 
     Its mode lies above the rate at which all were sampled, and neither deflection nor F/T was measured. Rotor
     and load turn as one; a simulation from commands alone would run away, the torque along the motion tells.
     """
-    free = rig.clamped == frozenset({"housing_end"}) and not rig["spring_end.stiffness"]
-    if rig.rigid_spring or rig.loop is not None or rig.motion != "simulated" or rig.conditions or not free:
-        return rig
-    if not all("position" in r and not {"deflection", "ft"} & r.channels.keys() for r in records):
-        return rig
-    if spring_mode(rig) < max(c.rate for r in records for c in r.channels.values() if len(c) > 1):
-        return rig
+    drifts = rig.clamped == frozenset({"housing_end"}) and not rig["spring_end.stiffness"]
+    is_plain = not rig.rigid_spring and rig.loop is None and rig.motion == "simulated" and not rig.conditions
+    is_blind = all("position" in r and not {"deflection", "ft"} & r.channels.keys() for r in records)
+    if not (drifts and is_plain and is_blind):
+        return rig, ()
+    mode, rate = spring_mode(rig), max(c.rate for r in records for c in r.channels.values() if len(c) > 1)
+    if mode < rate:
+        return rig, ()
     kept = {n: q for n, q in rig.quantities.items() if not n.startswith("spring.")}
-    return replace(rig, quantities=kept, rigid_spring=True)
+    return replace(rig, quantities=kept, rigid_spring=True), (mode, rate)
 
 
 def require_position(record: Record) -> None:
@@ -333,7 +336,7 @@ def noise_along(rig: Rig, motion: Motion) -> dict[str, float]:
     h = filtered_noise(period)
     slow = _behind_corner(h, motion.corner, period)
     white = {n: motion.white.get(n, 0.0) for n in _FILTERED}
-    own = {"motor_torque": white["motor_torque"] * _rms_sum(slow[0]), "ft": white["ft"] * _rms_sum(h[0])}
+    own = {n: white[n] * math.hypot(*x[0]) for n, x in (("motor_torque", slow), ("ft", h))}
     load = {"motor_torque": 0.0, "ft": 0.0}
     m = _as_one_part(rig)[1]
     mass, damping, stiffness = (float(x[0, 0]) for x in (m.mass, m.damping, m.stiffness))
@@ -341,9 +344,9 @@ def noise_along(rig: Rig, motion: Motion) -> dict[str, float]:
         damping, stiffness = damping - rig["spring.damping"], 0.0
         d = np.array([rig["spring.stiffness"], rig["spring.damping"], 0.0]) * white["deflection"]
         d = d if len(motion.d) else np.array([white["ft"], 0.0, 0.0])
-        load = {"motor_torque": _rms_sum(d @ slow), "ft": _rms_sum(d @ h)}
+        load = {"motor_torque": math.hypot(*(d @ slow)), "ft": math.hypot(*(d @ h))}
     moving = np.array([stiffness, damping, mass]) @ slow
-    moved = {"motor_torque": white["position"] * _rms_sum(moving), "ft": 0.0}
+    moved = {"motor_torque": white["position"] * math.hypot(*moving), "ft": 0.0}
     return {n: math.hypot(own[n], load[n], moved[n]) for n in motion.judged}
 
 
@@ -365,10 +368,6 @@ def filtered_noise(period: float) -> FloatArray:
     q = smooth(CubicSpline(at, one)(np.arange(2 * reach * finer + 1) * step), step)
     v = np.gradient(q, step)
     return np.array([q, v, np.gradient(v, step)])[:, ::finer]
-
-
-def _rms_sum(values: FloatArray) -> float:
-    return float(np.sqrt(np.sum(values**2)))
 
 
 def torques_along(rig: Rig, motion: Motion) -> dict[str, FloatArray]:

@@ -157,4 +157,6 @@ def test_a_spring_that_no_record_can_show_is_rigid(tmp_path, stiffness, beside, 
     rig, t = load_rig(str(tmp_path / "joint.yaml")), np.arange(100) / 33.0
     run = Record({n: Channel(t, np.sin(t)) for n in ("command", "position", *beside)})
     assert spring_mode(rig) == pytest.approx(np.sqrt(stiffness * 100.0) / (2.0 * np.pi), rel=1e-3)
-    assert as_seen(rig, [run]).rigid_spring == is_rigid
+    seen, numbers = as_seen(rig, [run])
+    assert seen.rigid_spring == is_rigid
+    assert numbers == ((spring_mode(rig), run["command"].rate) if is_rigid else ())
