@@ -115,10 +115,10 @@ class RecordNode:
 
     async def _keep_parameters(self, full: str, ask: Any, get: Any) -> None:
         names = (await ask.call_async(ListParameters.Request())).result.names
+        asked, name = time.time_ns(), "/parameter_events"  # before any change that the answer may lack
         values = (await get.call_async(GetParameters.Request(names=names))).values
-        now, name = time.time_ns(), "/parameter_events"
-        message = parameters_message(now, full, dict(zip(names, values, strict=True)))
-        self._bag.write(name, TOPICS[name], now, serialize_message(message))
+        message = parameters_message(asked, full, dict(zip(names, values, strict=True)))
+        self._bag.write(name, TOPICS[name], asked, serialize_message(message))
         for client in (ask, get):
             self._node.destroy_client(client)
 

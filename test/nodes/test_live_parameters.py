@@ -2,17 +2,19 @@
 
 import struct
 import time
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import yaml
-from rcl_interfaces.msg import ParameterEvent
+from rcl_interfaces.msg import ParameterEvent, ParameterValue
+from rcl_interfaces.srv import ListParameters
 from rclpy.lifecycle import LifecycleNode
 from rclpy.qos import qos_profile_sensor_data
-from rclpy.serialization import deserialize_message
+from rclpy.serialization import deserialize_message, serialize_message
 
 from msg_adapters import BagWriter, iterate
-from msg_adapters.ros import Bool, Clock, JointState, torque_command_message
+from msg_adapters.ros import Bool, Clock, JointState, parameters_message, torque_command_message
 from rsea_ros.nodes import driver
 from rsea_ros.nodes._joints import joint_table
 from rsea_ros.nodes._parameters import declare
@@ -21,6 +23,7 @@ from rsea_ros.nodes.joint import compose
 from test.nodes.test_driver import Spy
 
 SERVES = True
+EVENT = "rcl_interfaces/msg/ParameterEvent"
 
 
 @pytest.fixture
@@ -92,6 +95,31 @@ def test_each_joint_has_limits_of_its_own(driven, put):
     assert hip == 7.0 < knee
     for values in ({"torque_limit": 6.0}, {"hip__torque_limit": 6.0, "knee__torque_limit": 6.0}):
         assert "expected limits of one joint at once, of hip, knee" in put(node, **values)
+
+
+def test_a_change_while_a_node_is_asked_stands_after_its_answer(listener, tmp_path):
+    """The answer was stamped when it came: whoever read the last value of a bag read the older one."""
+    record = compose("record", listener.executor, {"out": str(tmp_path / "bag")}, namespace="asked")
+    named = SimpleNamespace(result=SimpleNamespace(names=["tolerance"]))
+    values = [ParameterValue(type=3, double_value=value) for value in (0.3, 0.2)]
+
+    class Service:
+        async def call_async(self, request):
+            if isinstance(request, ListParameters.Request):
+                return named
+            event = parameters_message(time.time_ns(), "/asked/model", {"tolerance": values[1]})
+            record.program._bag.write("/parameter_events", EVENT, time.time_ns(), serialize_message(event))
+            return SimpleNamespace(values=values[:1])
+
+    try:
+        with pytest.raises(StopIteration):
+            record.program._keep_parameters("/asked/model", Service(), Service()).send(None)
+    finally:
+        record.close()
+    rows = [row[-1] for row in iterate(tmp_path / "bag") if row[1] == EVENT]
+    told = [deserialize_message(raw, ParameterEvent) for raw in rows]
+    own = [event.new_parameters[0].value.double_value for event in told if event.node == "/asked/model"]
+    assert own == [0.3, 0.2]
 
 
 @pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
