@@ -121,8 +121,9 @@ PATIENCE = 10
 """Times the lost answers of a fault that a reading at configure or in clear_fault may lose."""
 AGAIN = 0.25
 """s after which a port that was lost is tried again."""
-STEP = 2.0
-"""Times the velocity limit: a position that changes faster has jumped, the fault `velocity` comes before."""
+STEP, COUNTS = 2.0, 2.0
+"""Times the velocity limit, and steps of the reading besides, one at either end: a position that changes by
+more has jumped; the fault `velocity` comes before."""
 
 
 class GuardedDevice:
@@ -284,7 +285,8 @@ class GuardedDevice:
         if before is None:
             return None
         time = max(1e-9 * (state.stamp - before.stamp), self._period)
-        step, most = abs(state.position - before.position), STEP * self.guard.limits.velocity * time
+        most = STEP * self.guard.limits.velocity * time + COUNTS * self._rating.count
+        step = abs(state.position - before.position)
         return DeviceFault("position_step", step, most, "rad", f"in {time:.3g} s") if step > most else None
 
     def _reach_again(self, error: DeviceError) -> None:

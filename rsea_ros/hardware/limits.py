@@ -80,7 +80,7 @@ class Rating:
     """What motor and sensor can do at most; inf: unknown.
 
     torque: N m, of the motor. velocity: rad/s, of the gear output without load. ft: N m, about the axis.
-    current: A, of the motor. lowest, highest: V, of its supply.
+    current: A, of the motor. lowest, highest: V, of its supply. count: rad, the step of a measured position.
     """
 
     torque: float = math.inf
@@ -89,6 +89,7 @@ class Rating:
     current: float = math.inf
     lowest: float = 0.0
     highest: float = math.inf
+    count: float = 0.0
 
 
 UNRATED = Rating()

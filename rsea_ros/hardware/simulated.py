@@ -8,14 +8,17 @@ import numpy as np
 
 from rsea_ros.errors import DeviceError
 from rsea_ros.hardware.device import State
+from rsea_ros.hardware.limits import Rating
 from rsea_ros.hardware.protection import PROCESS, Protection
 from rsea_ros.model.drive import steps_per_sample
-from rsea_ros.model.rig import Rig
+from rsea_ros.model.rig import Rig, Sensor
 from rsea_ros.model.simulation import Filters, build, measure, run
 from rsea_ros.model.step import OUTPUTS
 from rsea_ros.records.record import FloatArray
 
 SECOND = 1_000_000_000
+WIDE = 4.0
+"""Standard deviations of the encoder's noise that count as a step of it."""
 
 
 class SimulatedDevice:
@@ -42,6 +45,12 @@ class SimulatedDevice:
         self._steps, self._torque = 0, 0.0
         self._writes: list[tuple[int, float]] = []
         run(self._machine, np.zeros(1), np.empty((1, len(OUTPUTS))))  # compiles while there is time
+
+    @property
+    def rating(self) -> Rating:
+        """How coarse the rig's encoder is."""
+        sensor = self._rig.sensors.get("position", Sensor())
+        return Rating(count=sensor.quantum + WIDE * sensor.noise)
 
     def open(self) -> None:
         """Start at rest, now, also after a `close`."""

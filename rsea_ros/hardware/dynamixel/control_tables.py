@@ -77,6 +77,11 @@ class ControlTable:
         return self.items.get(name)
 
     @property
+    def count(self) -> float:
+        """Rad of a pulse."""
+        return 2.0 * math.pi / self.pulses
+
+    @property
     def sample(self) -> tuple[int, int]:
         """First address and size of the one read with all measurements."""
         return self.span(_MEASURED)

@@ -59,12 +59,14 @@ class Motor(BusMotor):
 
     @property
     def rating(self) -> Rating:
-        """Torque and current at the motor's own limit, its speed without load, the range of its supply."""
+        """Torque and current at its own limit, its speed without load, the range of its supply, a count."""
         own = self.limits
         if own is None:
             return Rating(math.nan)
         speed, supply = self.control_table.no_load_speed, (own.lowest_voltage, own.highest_voltage)
-        return Rating(self.torque_of(own.current), speed, math.inf, own.current, *supply)
+        return Rating(
+            self.torque_of(own.current), speed, math.inf, own.current, *supply, self.control_table.count
+        )
 
     def check(self, limits: Limits) -> None:
         """Compare the driver's limits with the motor's. Raises ParameterError."""
@@ -168,7 +170,7 @@ class Motor(BusMotor):
         current = table.current.value(data, start) * table.ampere
         return MotorSample(
             instant=instant,
-            position=counts * 2.0 * math.pi / table.pulses,
+            position=counts * table.count,
             velocity=table.velocity.value(data, start) * table.radian_per_second,
             torque=self.torque_of(current),
             current=current,

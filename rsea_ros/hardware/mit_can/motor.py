@@ -65,9 +65,10 @@ class MitMotor(BusMotor):
 
     @property
     def rating(self) -> Rating:
-        """The range of its torque, or what the drive is set to if that is less; the range of its speed."""
+        """The range of its torque, or what it is set to if that is less; the range of its speed; a count."""
         own = self._registers.get("torque_limit", math.inf)
-        return Rating(min(self.table.torque, own), self.table.velocity)
+        count = value(1, self.table.position, 16) - value(0, self.table.position, 16)
+        return Rating(min(self.table.torque, own), self.table.velocity, count=count)
 
     def check(self, limits: Limits) -> None:
         """Compare the driver's limits with ranges and settings of the drive. Raises ParameterError."""

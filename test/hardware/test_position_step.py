@@ -1,0 +1,84 @@
+"""A position that jumps is a fault; one that turns as fast as it may is none, however coarse its encoder."""
+
+import math
+import random
+from dataclasses import replace
+
+import pytest
+
+from rsea_ros.hardware.device import State
+from rsea_ros.hardware.dynamixel.control_tables import TABLES, MotorConnection, TorqueConstant
+from rsea_ros.hardware.dynamixel.motor import Motor
+from rsea_ros.hardware.dynamixel.own_limits import OwnLimits
+from rsea_ros.hardware.guarded import GuardedDevice
+from rsea_ros.hardware.limits import Limits
+from rsea_ros.hardware.mit_can.motor import CanConnection, MitMotor
+from rsea_ros.hardware.mit_can.tables import _families
+from rsea_ros.hardware.simulated import SimulatedDevice
+from rsea_ros.model.rig import Sensor
+from rsea_ros.model.rig_file import load_rig
+from test.hardware.logged_device import Device
+
+DRIVES = [name for content in _families().values() for name in content["models"]]
+SECOND, JITTER = 1_000_000_000, 0.4
+"""ns; share of a cycle by which a reading is early or late of its stamp."""
+
+
+def rating_of(model):
+    """What a motor of that model says of itself."""
+    if isinstance(model, str):
+        return MitMotor(CanConnection("vcan0", model)).rating
+    motor = Motor(MotorConnection("/dev/null"))
+    motor.table, motor.torque_constant = TABLES[model], TorqueConstant(1.0, 1.0, 1.0, "")
+    motor.limits = OwnLimits(0, 0, 0, 5.0, 80.0, 10.0, 30.0, 0.0, False)
+    return motor.rating
+
+
+class Turning(Device):
+    """A device whose encoder counts."""
+
+    def __init__(self, rating):
+        super().__init__()
+        self.rating = rating
+        self.turn(0.0, 0.0, 0.0)
+
+    def turn(self, at, angle, velocity):
+        """Stand at an angle (rad) at an instant (s)."""
+        whole = math.floor(angle / self.rating.count) * self.rating.count
+        self.state = State(round(at * SECOND), whole, velocity, 0.0, temperature=30.0)
+
+    def read(self):
+        return self.state
+
+
+@pytest.mark.parametrize("rate", [280.0, 1000.0])
+@pytest.mark.parametrize("model", [*TABLES, *DRIVES])
+def test_a_rotor_at_its_velocity_limit_is_no_fault_and_a_jump_beyond_it_is(model, rate):
+    """A count of an X (1.5 mrad) was more than twice what 0.2 rad/s allow at 280 Hz: a fault at the first."""
+    rating, dice = rating_of(model), random.Random(1)
+    count = 2.0 * math.pi / TABLES[model].pulses if model in TABLES else rating.count
+    assert rating.count == pytest.approx(count) and 0.0 < count < 4e-3
+    for velocity in (0.0, 1e-3, 0.2, 2.356, min(rating.velocity, 5.0)):
+        device = Turning(rating)
+        joint = GuardedDevice(device, Limits(64.0, deflection=math.inf, velocity=velocity), rate)
+        joint.open()
+        for k in range(100):
+            late, noise = dice.uniform(-JITTER, JITTER) / rate, dice.uniform(0.0, count)
+            device.turn(k / rate, velocity * (k / rate + late) + noise, velocity)
+            joint.read()
+        assert joint.fault is None, (velocity, f"{joint.fault}")
+        device.turn(100 / rate, joint.state.position + 2.0 * velocity / rate + 4.0 * count, velocity)
+        joint.read()
+        assert joint.fault.cause == "position_step", velocity
+
+
+@pytest.mark.parametrize("sensors", [{"position": Sensor(1e-3)}, {"position": Sensor(2e-3, 5e-3)}, {}])
+def test_a_coarse_or_noisy_encoder_of_a_simulated_rig_is_no_fault_at_rest(sensors):
+    rig, clock = replace(load_rig("paper_high_impedance"), sensors=sensors), [0]
+    device = SimulatedDevice(rig, 280.0, clock=lambda: clock[0])
+    joint = GuardedDevice(device, Limits(64.0, velocity=0.1), 280.0)
+    joint.open()
+    for _ in range(1000):
+        clock[0] += round(SECOND / 280.0)
+        joint.cycle(0.0, None)
+    assert joint.fault is None
