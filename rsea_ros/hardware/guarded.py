@@ -150,7 +150,7 @@ class GuardedDevice:
         self.cycles: Counter[str] = Counter()
         self.state: State | None = None
         self.lifted: list[str] = []
-        self.away = self._inferred = self._off_due = False
+        self.away = self._inferred = self._off = self._off_due = False
         self._reached = -math.inf
         self._turn, self._tare = threading.Lock(), threading.Lock()
         self._losses = {transfer: Losses(limits.lost_cycles) for transfer in ("read", "write")}
@@ -162,8 +162,8 @@ class GuardedDevice:
 
     @property
     def is_off(self) -> bool:
-        """Whether the motor has acknowledged since the last stop that its torque is off."""
-        return not (self.away or self._off_due)
+        """Whether the motor has acknowledged that its torque is off, since it was on and since a stop."""
+        return self._off and not (self.away or self._off_due)
 
     @property
     def enabled(self) -> bool:
@@ -178,6 +178,7 @@ class GuardedDevice:
         """
         self.device.open()
         self.state, self._inferred, self.guard.limits = None, False, self._limits
+        self._off, self._off_due = True, False
         for losses in self._losses.values():
             losses.clear()
         try:
@@ -302,7 +303,6 @@ class GuardedDevice:
         if self._off_due:
             with suppress(DeviceError):
                 self._switch_off()
-                self._off_due = False
 
     def write(self, wanted: float, age: float | None) -> float:
         """Write a torque (N m) within the limits, zero when not enabled; return it. age: see Guard."""
@@ -328,7 +328,7 @@ class GuardedDevice:
                 raise DeviceError(BUSY)
             self.guard.restart()
             try:
-                self.device.enable()
+                self._switch_on()
                 self.interlock.enable(asked)
             except DeviceError:
                 with suppress(DeviceError):
@@ -402,9 +402,16 @@ class GuardedDevice:
             self.guard.trip(fault)
             raise DeviceError(f"{fault} is still there, expected it to be over")
 
+    def _switch_on(self) -> None:
+        self._off = self._off_due = False
+        self.device.enable()
+
     def _switch_off(self) -> None:
+        """Zero the torque and switch it off; a motor that does not acknowledge it still owes it."""
+        self._off_due = True
         self.device.disable()
         self.device.protection.beat(False)
+        self._off, self._off_due = True, False
 
     @property
     def contradiction(self) -> str:
@@ -439,7 +446,8 @@ class GuardedDevice:
     def _alone(self, work: Callable[[], None], asked: int = 0) -> None:
         """Use the device while the cycles leave it alone, then restart at zero torque.
 
-        asked: the number of a request that ends stops; 0: none.
+        asked: the number of a request that ends stops; 0: none. What fails leaves a fault, and the motor off
+        as soon as it answers.
         """
         with self._turn:
             if self.away:
@@ -447,15 +455,19 @@ class GuardedDevice:
             self.away, began = True, event()
         try:
             work()
-            self._off_due = False
             for losses in self._losses.values():
                 losses.clear()
             if self.enabled:
-                self.device.enable()
+                self._switch_on()
             self.guard.restart()
             self.interlock.end_fault(began)
             if asked:
                 self.interlock.end_stop(asked)
+        except Exception as error:
+            self._off_due = True
+            if self.fault is None:
+                self.guard.trip(DeviceFault("reboot", detail=f"failed: {error}"))
+            raise
         finally:
             with self._turn:
                 if self.interlock.stopped:

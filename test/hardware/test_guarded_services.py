@@ -160,6 +160,53 @@ def test_a_failed_reboot_lets_go_of_the_device(joint, device):
     assert not joint.away and joint.fault.cause == "ft"
 
 
+@pytest.mark.parametrize("latched", ["", "ft"])
+@pytest.mark.parametrize("broken", ["disable", "reboot", "read", "enable"])
+def test_a_failed_reboot_leaves_a_fault_and_a_motor_that_is_off(joint, device, broken, latched):
+    """It was active without a fault, with a motor that was off, or on at 5 N m where the answer was lost."""
+    joint.write(9.0, 0.0)
+    if latched:
+        joint.guard.trip(DeviceFault(latched))
+    device.broken = {broken: [LOST] * 30}
+    with pytest.raises(NoReply):
+        joint.reboot()
+    assert str(joint.fault).rstrip() == (f"{latched}:" if latched else "reboot: failed: no reply")
+    assert not joint.is_off and joint.enabled
+    device.log.clear()
+    for answer in (LOST, LOST, None):
+        device.broken = {"disable": [answer]}
+        joint.cycle(9.0, 0.0)
+        assert joint.is_off is (answer is None) and joint.guard.torque == 0.0
+    joint.cycle(9.0, 0.0)
+    assert device.log.count("disable") == 3
+    assert joint.clear() is True and joint.write(9.0, 0.0) == 4.0 and not joint.is_off
+    joint.cycle(9.0, 0.0)
+    assert device.log.count("disable") == 3
+
+
+def test_a_clear_whose_enable_is_not_answered_switches_the_motor_off(joint, device):
+    joint.guard.trip(DeviceFault("ft"))
+    device.broken = {"enable": [LOST]}
+    with pytest.raises(NoReply):
+        joint.clear()
+    joint.cycle(9.0, 0.0)
+    assert joint.fault.cause == "ft" and device.log[-2:] == ["disable", "beat False"] and joint.is_off
+
+
+@pytest.mark.parametrize("anew", [False, True])
+def test_a_motor_that_did_not_answer_a_deactivation_is_switched_off_when_it_does(joint, device, anew):
+    """It stayed on at zero, and was said to be off."""
+    device.broken = {"disable": [LOST]}
+    with pytest.raises(NoReply):
+        joint.disable()
+    assert not joint.is_off and not joint.enabled
+    if anew:
+        joint.enable()
+    device.log.clear()
+    joint.cycle(9.0, 0.0)
+    assert ("disable" in device.log) is joint.is_off is not anew
+
+
 def test_a_device_disabled_during_a_reboot_stays_without_torque(joint, device):
     device.during = {"reboot": joint.disable}
     joint.reboot()

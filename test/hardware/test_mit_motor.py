@@ -111,6 +111,20 @@ def opened(virtual):
 
 
 @pytest.mark.parametrize("model", ("DM8009", "RS03", "CyberGear", "AK10-9", "mini-cheetah"))
+def test_a_drive_that_did_not_answer_to_be_on_is_told_that_it_is_off(opened, model):
+    """It counted as on, and the next commands were its torque."""
+    _, motor, plant = opened(model)
+    motor.disable()
+    hear, motor.port.receive = motor.port.receive, lambda timeout: None
+    with pytest.raises(NoReply):
+        motor._switch(on=True)
+    motor.port.receive = hear
+    motor.write(5.0)
+    motor.read()
+    assert plant.torque == 0.0
+
+
+@pytest.mark.parametrize("model", ("DM8009", "RS03", "CyberGear", "AK10-9", "mini-cheetah"))
 def test_the_torque_that_is_commanded_alone_acts_and_is_read_back(virtual, model):
     bus = virtual(model)
     motor, plant = bus.motor(model), bus.plants[0]

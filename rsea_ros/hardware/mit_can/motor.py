@@ -209,11 +209,12 @@ class MitMotor(BusMotor):
 
     def _switch(self, *, on: bool) -> Feedback:
         """Switch the torque, until the state in the answer is that. Raises DeviceError."""
-        self._on = on
+        self._on = False
         frame = self._frames.enable() if on else self._frames.disable()
         for _ in range(ATTEMPTS):
             feedback = self._ask_state(frame)
             if not self.table.on or (feedback.state == self.table.on) == on:
+                self._on = on
                 return feedback
             frame = self._frames.command(0.0) if on else frame
         state = feedback.error or feedback.state
