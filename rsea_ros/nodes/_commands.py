@@ -31,8 +31,9 @@ class CommandQueue:
     their stamp). A command that takes effect at once overtakes earlier waiting ones. One that is not finite,
     or beyond NONSENSE times the limit, is dropped (`refused`). 50 ms after the last command the torque is
     zero (`expired` counts how often).
-    first: the first one (N m) since the last `clear`, whether it ever took effect or not. stamp: ns, of the
-    torque in force, also where that came too late for it.
+    first: the first that is not zero since the last `clear`, whether it ever took effect or not: how long
+    after the first of all it came (ns), and N m. stamp: ns, of the torque in force, also where that came too
+    late for it.
     strict, as in front of a real machine: a stamp further than 0.3 s from now is `refused` too, unless there
     is none, and the last torque stays in force: the machine's limits end it.
     """
@@ -45,7 +46,8 @@ class CommandQueue:
         self._taken_until = self._from = 0
         self._newest: int | None = None
         self.stamp, self.torque, self.furthest = 0, 0.0, 0.0
-        self.first: float | None = None
+        self._began: int | None = None
+        self.first: tuple[int, float] | None = None
         self.ahead = self.lateness = 0
         self.late = self.unstamped = self.off = self.refused = self.expired = self.dropped = 0
 
@@ -67,7 +69,9 @@ class CommandQueue:
             elif stamp < self._taken_until:
                 self.late, self.lateness = self.late + 1, max(self.lateness, now - stamp)
             self.ahead += stamp > now
-            self.first = torque if self.first is None else self.first
+            self._began = now if self._began is None else self._began
+            if self.first is None and torque != 0.0:
+                self.first = now - self._began, torque
             if stamp <= now:
                 self._waiting = [w for w in self._waiting if w.when <= now]
             self._waiting.append(PendingCommand(max(stamp, self._taken_until), torque, now, stamp))
@@ -113,7 +117,8 @@ class CommandQueue:
     def clear(self, since: int = 0) -> None:
         """Drop all commands; the torque is zero. since: ns; commands from before are dropped also later."""
         with self._lock:
-            self._waiting, self._newest, self.torque, self.first = [], None, 0.0, None
+            self._waiting, self._newest, self.torque = [], None, 0.0
+            self._began = self.first = None
             self._from = max(self._from, since)
 
     def values(self, now: int) -> dict[str, object]:

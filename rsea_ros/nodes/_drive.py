@@ -12,6 +12,8 @@ from rsea_ros.nodes._commands import CommandQueue
 from rsea_ros.nodes._cycle import SECOND, Anchor
 
 CLOCK_STEP, RESTARTED = "clock_step", "restarted"
+REST = 1.0
+"""s without a torque from the first command on, which a stream that is on and off at 1 Hz does not have."""
 
 
 class CommandSource(Protocol):
@@ -26,8 +28,8 @@ class CommandSource(Protocol):
 class DriverCycle:
     """A guarded device, driven by a source's commands. rate: Hz. anchor: the clock of stamps and ages.
 
-    lock: held while a cycle takes a command and the device gets it. zero_first: whether a first command that
-    is a torque is a fault: nobody has asked for it since the driver died and was started again.
+    lock: held while a cycle takes a command and the device gets it. zero_first: whether a torque of a stream
+    without a REST is a fault: nobody has asked for it since the driver died and was started again.
     """
 
     def __init__(self, guarded: GuardedDevice, source: CommandSource, anchor: Anchor, rate: float) -> None:
@@ -48,9 +50,12 @@ class DriverCycle:
         commands.take(max(stamp, now - self._period) + self._period // 2)
         if self.zero_first and commands.first is not None and not self._deaf:
             self.zero_first = False
-            if commands.first != 0.0:
-                torque = f"the first command since autostart is {commands.first:.4g} N·m"
-                detail = f"{torque}, expected 0 N·m or resume:=true"
+            rest, torque = commands.first[0] / SECOND, commands.first[1]
+            if rest < REST:
+                detail = (
+                    f"the first torque since autostart, {torque:.4g} N·m, came {rest:.3g} s after the first"
+                    f" command, expected {REST:g} s of 0 N·m or resume:=true"
+                )
                 self.guarded.guard.trip(DeviceFault(RESTARTED, detail=detail))
         return commands.torque, None if self._deaf else commands.age(now)
 

@@ -104,7 +104,7 @@ class DrivenJoint:
     def enable(self, *, zero_first: bool = False) -> None:
         """Switch the torque on and let commands through, from the next one on. Raises DeviceError.
 
-        zero_first: whether that one must be zero. Raises ParameterError where nothing limits a free end.
+        zero_first: see DriverCycle. Raises ParameterError where nothing limits a free end.
         """
         assert self.drive is not None
         if self._double:

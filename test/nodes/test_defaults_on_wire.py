@@ -139,7 +139,8 @@ def test_a_driver_that_starts_under_a_stream_of_commands_makes_no_torque_by_itse
     """One that was killed and started again did. Then commands during the activation kept it inactive."""
     fault = listener.until(wire.latched)
     listener.until(lambda: wire.value("active") == "True")
-    assert fault.startswith("restarted: the first command since autostart is 10 N·m") or is_stall(fault)
+    told = "restarted: the first torque since autostart, 10 N·m, came 0 s after the first command"
+    assert fault.startswith(told) or is_stall(fault)
     assert not any(goal and on for _, goal, on in wire.bench.log()["torque"])
 
 
