@@ -72,10 +72,10 @@ class DriverCycle:
                 self._source.commands.clear(self.anchor.now())
                 self._deaf -= 1
 
-    def stop(self, *, is_answered: bool = True) -> None:
+    def stop(self) -> None:
         """End the torque with the next cycle, until a later clear; commands so far are forgotten."""
         with self.deaf():
-            self.guarded.stop(is_answered=is_answered)
+            self.guarded.stop()
 
     def _see_to_the_clock(self, by: int) -> None:
         """Drop the commands from before the system clock was set: nobody knows which are of now.

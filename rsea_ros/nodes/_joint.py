@@ -61,6 +61,7 @@ class DrivenJoint:
         ):  # fmt: skip
             offers.append(Offer(node, jobs, space + name, work, after))
         offers.append(stop_of(node, jobs, f"{space}stop", [self], offers, after))
+        self._offers = offers
 
     def open(self, anchor: Anchor) -> None:
         """Open the device and make its topics. Raises RseaError, OSError; nothing stays open then."""
@@ -113,7 +114,9 @@ class DrivenJoint:
             check_travel(self.guarded.guard.limits.position, load_rig(self._values["rig"]))
         with self.drive.deaf():
             self.drive.zero_first = zero_first
+            take_up(self._offers)
             self.guarded.enable()
+            take_up(self._offers)
 
     def close(self) -> None:
         """Take the topics away; the device is closed already, or not open."""
@@ -213,7 +216,7 @@ def stop(joints: Sequence[DrivenJoint]) -> str:
     Raises DeviceError where a motor has not acknowledged that it is off; the stop holds all the same.
     """
     for drive in [joint.opened() for joint in joints]:
-        drive.stop(is_answered=False)
+        drive.stop()
     time.sleep(OVERTAKING)
     end = time.monotonic() + CONFIRMING
     while on := [joint for joint in joints if not joint.guarded.is_off]:
@@ -240,26 +243,38 @@ def stop_of(
     The middleware hands the requests of several services over in any order, and a busy executor late.
     """
 
+    def hold() -> None:
+        for joint in joints:
+            if joint.drive is not None:
+                joint.guarded.stop(is_answered=False)
+
     def answer() -> None:
-        for offer in offers:
-            offer.take_up()
+        take_up(offers)
         for joint in joints:
             joint.guarded.interlock.answer()
         after()
 
-    return Offer(node, jobs, name, lambda asked: stop(joints), answer)
+    return Offer(node, jobs, name, lambda asked: stop(joints), answer, hold)
+
+
+def take_up(offers: Sequence[Offer]) -> None:
+    """Take up the requests that wait, in the executor's thread."""
+    for offer in offers:
+        offer.take_up()
 
 
 class Offer:
     """A service ~/NAME that does some work in a thread, and answers with the error where it fails.
 
-    after: called before the answer.
+    after: called before the answer. at_once: called where a request is taken.
     """
 
     def __init__(
-        self, node: Node, jobs: Jobs, name: str, work: Work, after: Callable[[], None]
-    ) -> None:
+        self, node: Node, jobs: Jobs, name: str, work: Work, after: Callable[[], None],
+        at_once: Callable[[], None] = lambda: None,
+    ) -> None:  # fmt: skip
         self._node, self._jobs, self._name, self._work, self._after = node, jobs, name, work, after
+        self._at_once = at_once
         self._service = node.create_service(Trigger, f"~/{name}", self._serve, callback_group=jobs.group)
 
     def take_up(self) -> None:
@@ -269,13 +284,14 @@ class Offer:
                 _, header = self._service.handle.service_take_request(Trigger.Request)
             if header is None:
                 return
-            assert self._node.executor is not None
-            self._node.executor.create_task(self._reply, event(), header)
+            self._at_once()
+            self._jobs.soon(self._reply, event(), header)
 
     async def _reply(self, asked: int, header: Any) -> None:
         self._service.send_response(await self._answer(asked, Trigger.Response()), header)
 
     async def _serve(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        self._at_once()
         return await self._answer(event(), response)
 
     async def _answer(self, asked: int, response: Trigger.Response) -> Trigger.Response:

@@ -70,10 +70,20 @@ class Jobs:
     """Threads of a node's services. group: the callback group of these services."""
 
     def __init__(self, node: Node) -> None:
-        self.group = ReentrantCallbackGroup()
-        self._tick = node.create_timer(TICK, lambda: None, self.group, clock=STEADY)
+        self.group, self._node = ReentrantCallbackGroup(), node
+        self._tick = node.create_timer(TICK, self._begin, self.group, clock=STEADY)
         self._tick.cancel()
         self._threads: set[threading.Thread] = set()
+        self._waiting: list[tuple[Any, ...]] = []
+
+    def soon(self, *task: Any) -> None:
+        """Let the executor do a task, a coroutine function and its arguments, also before there is one."""
+        self._waiting.append(task)
+        self._tick.reset()
+
+    def _begin(self) -> None:
+        while self._waiting and self._node.executor is not None:
+            self._node.executor.create_task(*self._waiting.pop(0))
 
     async def do(self, work: Callable[[], str]) -> str:
         """Return the result of the work or raise its error; the executor goes on meanwhile."""
@@ -94,7 +104,7 @@ class Jobs:
             return str(await future)
         finally:
             self._threads.discard(thread)
-            if not self._threads:
+            if not (self._threads or self._waiting):
                 self._tick.cancel()
 
     def join(self, timeout: float) -> None:

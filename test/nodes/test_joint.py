@@ -153,6 +153,7 @@ def made():
     })  # fmt: skip
     joint._node = SimpleNamespace(get_logger=lambda: logger)
     joint.part, joint._ended, joint._double, joint._reported = "", "", "", (None, 0)
+    joint._offers = []
     joint._health = SimpleNamespace(publish=lambda: calls.append("health"))
     guard = SimpleNamespace(limited=0, limits=Limits(torque=8.0, slew=300.0), refused=2)
     joint.guarded = SimpleNamespace(
@@ -168,7 +169,7 @@ def made():
         calls.append("deaf")
         yield
 
-    joint.drive = SimpleNamespace(deaf=deaf, stop=lambda *, is_answered: calls.append(("stop", is_answered)))
+    joint.drive = SimpleNamespace(deaf=deaf, stop=lambda: calls.append("stop"))
     joint._cycle = SimpleNamespace(rest=lambda: calls.append("rest"))
     asked = []
     joint.topics = SimpleNamespace(
@@ -243,7 +244,7 @@ def test_a_stop_waits_until_every_motor_is_off(made, monkeypatch):
 
     monkeypatch.setattr(module.time, "sleep", sleep)
     assert stop([joint]) == "torque zero until clear_fault, the motor is off"
-    assert calls == [("stop", False)] and waits == [0.05]
+    assert calls == ["stop"] and waits == [0.05]
     joint.guarded.is_off = False
     waits.clear()
     stop([joint])

@@ -6,15 +6,19 @@ and no stop or fault that a request which began later has not ended.
 
 from __future__ import annotations
 
+import asyncio
 import itertools
 import random
 from collections import Counter
+from types import SimpleNamespace
 
 import pytest
 
 from rsea_ros.errors import DeviceError
 from rsea_ros.hardware.device import NoReply
 from rsea_ros.hardware.interlock import DeviceFault, Interlock, event
+from rsea_ros.nodes import _joint
+from rsea_ros.nodes._joint import DrivenJoint, Offer, stop_of
 from test.nodes.monitor import World
 
 FAULT = DeviceFault("ft", detail="silent")
@@ -231,3 +235,86 @@ def test_a_clear_that_comes_before_the_answer_of_a_stop_ends_none():
         lock.end_stop(waiting)
     lock.end_stop(event())
     assert not lock.stopped
+
+
+class Waiting(list):
+    """Requests of a service that nobody has taken."""
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *error):
+        """Let it go."""
+
+    def service_take_request(self, kind):
+        return None, self.pop(0) if self else None
+
+
+class Desk:
+    """The services of a joint. An executor takes the requests that wait, of any service first."""
+
+    def __init__(self, monkeypatch):
+        self.world, self.taken, self.made = World(), [], []
+        self.joint = joint = DrivenJoint.__new__(DrivenJoint)
+        joint.guarded, joint.drive, joint.part, joint._double = self.world.guarded, self.world.drive, "", ""
+        joint._values, joint._offers = {"allow_no_position_limit": True}, []
+        logger = SimpleNamespace(info=lambda text: None)
+        node = SimpleNamespace(create_service=self._service, get_logger=lambda: logger)
+        jobs = SimpleNamespace(group=None, do=self._do, soon=lambda *task: self.taken.append(task))
+        self.offers = {
+            name: Offer(node, jobs, name, work, lambda: None)
+            for name, work in (("clear", joint.clear_fault), ("reboot", joint._reboot))
+        } | {"stop": stop_of(node, jobs, "stop", [joint], joint._offers, lambda: None)}
+        joint._offers += self.offers.values()
+        monkeypatch.setattr(_joint.time, "sleep", lambda seconds: self.cycles(14))
+
+    def _service(self, kind, name, serve, callback_group):
+        return SimpleNamespace(handle=Waiting(), serve=serve, send_response=lambda response, header: None)
+
+    async def _do(self, work):
+        return work()
+
+    def cycles(self, count):
+        self.made += self.world.cycles(count, 10.0)
+
+    def send(self, name):
+        if name != "enable":
+            self.offers[name]._service.handle.append(name)
+
+    def serve(self, name):
+        """Do what the executor does with a request, unless it was taken up before."""
+        if name == "enable":
+            try:
+                self.joint.enable()
+            except DeviceError:
+                self.world.guarded.disable()
+        elif self.offers[name]._service.handle:
+            self.offers[name]._service.handle.pop(0)
+            asyncio.run(self.offers[name]._service.serve(None, SimpleNamespace()))
+        self.cycles(3)
+        while self.taken:
+            do, *given = self.taken.pop(0)
+            asyncio.run(do(*given))
+        self.cycles(30)
+
+
+@pytest.mark.parametrize("late", [False, True])
+@pytest.mark.parametrize("others", [(), ("clear",), ("reboot",), ("clear", "reboot")])
+def test_a_stop_that_waits_is_overtaken_by_no_activation(monkeypatch, others, late):
+    """Sent during configure, it was executed after an activation that was sent later: up to 3 torques."""
+    for order in itertools.permutations(("stop", "enable", *others)):
+        desk = Desk(monkeypatch)
+        desk.world.monitor.active = True
+        for name in order:
+            if name != "stop" or not late:
+                desk.send(name)
+        if late:
+            desk.world.motor.at("enable", lambda desk=desk: desk.send("stop"))
+        for name in order:
+            desk.serve(name)
+        assert not any(desk.made), order
+        assert desk.world.guarded.interlock.stopped, order
+        for name in ("clear", "enable"):
+            desk.send(name)
+            desk.serve(name)
+        assert desk.world.torques[-1] == 10.0 and not desk.world.monitor.violations
