@@ -4,12 +4,13 @@ import math
 from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from numbers import Real
 from typing import Protocol, runtime_checkable
 
 from rsea_ros.errors import ParameterError
 from rsea_ros.hardware.device import State
 from rsea_ros.hardware.interlock import DeviceFault, Interlock, event
-from rsea_ros.records.record import NONSENSE, is_measured
+from rsea_ros.records.record import HUGE, NONSENSE, is_measured
 
 COMMAND_TIMEOUT = "command_timeout"
 HEARD_LATE = 3
@@ -59,6 +60,12 @@ class Limits:
     ft_axis: int = 5
     derived: Mapping[str, str] = field(default_factory=dict)
     unlikely: str = ""
+
+    def __post_init__(self) -> None:
+        """Raise ParameterError for a limit that limits nothing, as nan does, or is negative; inf is none."""
+        for name, value in vars(self).items():
+            if isinstance(value, Real) and not float(value) >= 0.0:
+                raise ParameterError(f"limit {name} = {value}, expected a number of at least 0")
 
     def __str__(self) -> str:
         """Return the limits of torque, motion and motor, each derived one with its source."""
@@ -136,9 +143,9 @@ def complaint(limits: Limits, state: State, *, deflects: bool = False) -> Device
 
     deflects: whether the spring's deflection was measured before: then the drive's angle is none instead.
     """
-    if not all(map(is_measured, (state.position, state.velocity, state.motor_torque))):
+    if not all(is_measured(value, HUGE) for value in (state.position, state.velocity, state.motor_torque)):
         reading = f"{state.position} rad, {state.velocity} rad/s, {state.motor_torque} N·m"
-        return DeviceFault("reading", detail=f"{reading}, expected finite values")
+        return DeviceFault("reading", detail=f"{reading}, expected finite values up to {HUGE:g}")
     for cause, words in (
         ("hardware_error", state.hardware_error),
         ("motor_state", state.motor_trouble),
@@ -229,8 +236,13 @@ class Guard:
         return None
 
     def allowed_torque(self, wanted: float, age: float | None) -> float:
-        """Return the torque to write now (N m). age: of the command, s; None without a command."""
-        limits, age = self.limits, age if is_measured(age) else None
+        """Return the torque to write now (N m). age: of the command, s; None without a command.
+
+        One from further ahead than command_timeout and a cycle is none: its clock is wrong.
+        """
+        limits = self.limits
+        early = -max(limits.command_timeout, self._period)
+        age = age if age is not None and math.isfinite(age) and age >= early else None
         if self.fault is None and age is not None and age > limits.command_timeout and self.torque != 0.0:
             self.trip(DeviceFault(COMMAND_TIMEOUT, 1e3 * age, 1e3 * limits.command_timeout, "ms"))
         if self.interlock.halted or self.interlock.stopped:

@@ -140,13 +140,25 @@ def test_the_fault_of_late_commands_says_how_late():
     assert str(limiter.fault) == "command_timeout: 60 ms, limit 50 ms"
 
 
-@pytest.mark.parametrize(("wanted", "age"), [(math.nan, 0.0), (math.inf, 0.0), (-1e6, 0.0), (10.0, math.nan)])
+@pytest.mark.parametrize(
+    ("wanted", "age"),
+    [(math.nan, 0.0), (math.inf, 0.0), (-1e6, 0.0), (10.0, math.nan), (10.0, -1e9), (10.0, -0.051)],
+)
 def test_a_command_that_is_none_leads_to_zero_within_the_slew_limit(wanted, age):
-    """NaN was returned, and dropped the slew limit; -1e6 N m was obeyed as -68; an age of NaN was none."""
+    """NaN was returned, and dropped the slew limit; -1e6 N m was obeyed as -68; an age of NaN was none.
+
+    One of -1e9 s was fresh.
+    """
     limiter = guard(slew=192.0)
     made = torques(limiter, *[10.0] * 4, *[(wanted, age)] * 4, 10.0)
     assert made[3:] == [10.0, 7.0, 4.0, 1.0, 0.0, 3.0]
     assert limiter.refused == (4 if age == 0.0 else 0)
+
+
+def test_a_command_that_takes_effect_within_this_cycle_is_fresh():
+    """A cycle takes what is due until half a period later, 50 ms at 10 Hz."""
+    assert torques(guard(), (9.0, -0.05)) == [9.0]
+    assert torques(guard(0.1), (9.0, -0.1), (9.0, -0.11)) == [9.0, 0.0]
 
 
 EFFORT = {"effort": 4.0, "effort_time": 3 * PERIOD}
@@ -170,7 +182,7 @@ def misses(limiter, *measured, wanted=10.0):
         (EFFORT, [6.0] * 5, [False] * 5),  # 4 N m are allowed
         (EFFORT, [14.0] * 5, [False] * 5),
         (EFFORT, [5.9, 5.9, 5.9, 10.0, 5.9, 5.9, 5.9], [False] * 7),  # it counts from the last right one
-        ({}, [1e9] * 30, [False] * 30),  # by default nothing
+        ({}, [1e6] * 30, [False] * 30),  # by default nothing
         ({"effort": 4.0}, [0.0] * 7, [False] * 6 + [True]),  # by default 0.1 s: 7 cycles are 0.109
     ],
 )

@@ -74,15 +74,27 @@ def test_a_voltage_at_its_limit_is_fine_and_one_below_it_is_not():
         (reading(temperature=70.1), "temperature"),
         (reading(current=1e9), None),
         (reading(voltage=0.0), None),
-        (reading(velocity=1e9), None),
-        (reading(position=1e9, deflection=0.0), None),
+        (reading(velocity=1e6), None),
+        (reading(position=1e6, deflection=0.0), None),
         (reading(wrench=(1e9,) * 6), None),
-        (reading(velocity=1e9, motor_torque=1e9), None),
+        (reading(velocity=1e6, motor_torque=1e6), None),
     ],
 )
 def test_spring_and_motor_are_guarded_by_default_and_nothing_else(state, cause):
     fault = complaint(Limits(68.0), state)
     assert (fault and fault.cause) == cause
+
+
+NUMBERS = [name for name, value in vars(Limits(68.0)).items() if isinstance(value, (int, float))]
+
+
+@pytest.mark.parametrize("value", [math.nan, -1.0])
+@pytest.mark.parametrize("name", NUMBERS)
+def test_a_limit_that_is_no_number_or_negative_is_refused(name, value):
+    """NaN is beyond nothing: it limited nothing, in silence."""
+    with pytest.raises(ParameterError, match=rf"^limit {name} = {value}, expected a number of at least 0$"):
+        only(**{name: value})
+    assert len(NUMBERS) == 17
 
 
 MEASURED = {"temperature": 30.0, "current": 1.0, "voltage": 24.0}
@@ -118,7 +130,7 @@ def test_the_torque_is_that_about_the_axis_of_the_actuator(axis):
 
 
 @pytest.mark.parametrize("name", ["position", "velocity", "motor_torque"])
-@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, 1e300, -1.1e6])
 def test_a_reading_that_is_no_number_is_a_fault_with_its_values(name, value):
     fault = complaint(WIDE, reading(**{name: value}))
     assert fault.cause == "reading"
