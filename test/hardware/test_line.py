@@ -10,7 +10,7 @@ import pytest
 
 from rsea_ros.errors import DeviceError, ParameterError
 from rsea_ros.hardware.device import NoReply, Spring
-from rsea_ros.hardware.dynamixel.control_tables import MotorConnection, usual_latency
+from rsea_ros.hardware.dynamixel.control_tables import TABLES, MotorConnection, usual_latency
 from rsea_ros.hardware.dynamixel.encoder import LINK, BusEncoder, EncoderConnection
 from rsea_ros.hardware.dynamixel.line import Line, LineMotor
 from rsea_ros.hardware.guarded import GuardedDevice, cycle
@@ -19,6 +19,7 @@ from rsea_ros.hardware.motor_netft import MotorNetft
 from rsea_ros.hardware.netft.sensor import SensorConnection
 from rsea_ros.hardware.peer.peer_motor import IDENTITY
 from rsea_ros.hardware.peer.registers import ENCODER
+from rsea_ros.hardware.protection import Supervised
 from rsea_ros.nodes import driver
 from rsea_ros.nodes._devices import dynamixel_netft
 from test.hardware.conftest import FT_TIMEOUT, LATENCY, PERIOD, STIFFNESS, WATCHDOG
@@ -178,6 +179,21 @@ def test_an_unplugged_motor_does_not_silence_the_others(three):
     three.beside(three.members[0].clear)
     three.cycles(8, (1.0, 1.0, 1.0))
     assert three.causes() == [None] * 3 and three.acting() == [True] * 3
+
+
+def test_a_clear_of_a_motor_that_is_away_lets_no_supervisor_go(monkeypatch):
+    """It wrote its frames and read the answers of the others, on the port of all, for seconds: no_reply."""
+    motor = LineMotor(MotorConnection("/dev/null"), Line("/dev/null", 4_000_000, LATENCY))
+    motor.table, motor.protection, released = TABLES[54024], Supervised(WATCHDOG), []
+
+    def lose(*given):
+        raise NoReply("away")
+
+    monkeypatch.setattr(motor.protection, "release", lambda *, safe: released.append(safe))
+    monkeypatch.setattr(motor.bus, "patiently", lose)
+    with pytest.raises(NoReply):
+        motor.recover()
+    assert released == [] and motor.table is not None
 
 
 def test_the_death_of_the_host_is_each_motors_own_watchdog(three):

@@ -212,11 +212,16 @@ class LineMotor(Motor):
         self._line.set_goal(self._id, self.counts(torque))
 
     def recover(self) -> None:
-        """Reconnect; where the port was lost, every motor of the line must be recovered."""
+        """Reconnect; where the port was lost, every motor of the line must be recovered.
+
+        Nothing is closed of a motor that is away: its supervisor, let go, would stop it on the port of all.
+        """
         try:
             self.bus.patiently(self.bus.ping)
         except PortLost:
             self._line.give_up()
+        except NoReply:
+            raise
         except DeviceError:
             pass  # a fault of this motor alone is handled below
         super().recover()
