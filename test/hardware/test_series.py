@@ -2,6 +2,7 @@
 
 import math
 from contextlib import closing, suppress
+from pathlib import Path
 from statistics import fmean
 
 import pytest
@@ -117,6 +118,14 @@ def test_the_zero_of_the_makers_urdfs_is_the_offset_of_its_ros_packages():
     offset = {"x": -3.14159265359, "mx": -3.14159265359, "p": 0.0, "pro": 0.0}
     for table in TABLES.values():
         assert -table.zero * math.tau / table.pulses == pytest.approx(offset[table.series], abs=1e-9)
+
+
+def test_the_page_of_devices_has_every_model_with_its_numbers():
+    page = (Path(__file__).resolve().parents[2] / "docs" / "devices.md").read_text(encoding="utf-8")
+    for number, table in TABLES.items():
+        known = table.torque_constant
+        torque = f"{known.value:g} | {known.low:g} to {known.high:g} |" if known else "not known, set it | |"
+        assert f"| {table.name} | {number} | {1e3 * table.ampere:.4g} | {table.pulses} | {torque}\n" in page
 
 
 def test_the_bench_has_every_model_with_the_same_units():
