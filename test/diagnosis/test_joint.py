@@ -20,8 +20,8 @@ SETTINGS = trying(*TRIED, max_causes=2)
 
 
 def log_joint(rig):
-    """Return 6 s of a joint whose inertia, damping and gravity are not those of its rig."""
-    targets = excitation("chirp", replace(JOINT, duration=6.0, high=3.0))
+    """Return 5 s of a joint whose inertia, damping and gravity are not those of its rig."""
+    targets = excitation("chirp", replace(JOINT, duration=5.0, high=3.0))
     off = {"rotor.reflected_inertia": 0.026, "rotor.reflected_damping": 0.35, "spring_end.gravity": 0.6}
     return simulate(rig.with_values(off), targets, JOINT.rate, seed=6)
 
