@@ -62,7 +62,7 @@ def test_a_rig_that_is_wrong_decides_between_no_two_causes():
     """A wrong motor constant and a wrong gain differ by the rig's values alone, and one of these is off."""
     name, value, cause, rival = "spring.stiffness", 1.6, "ft_gain_error", "torque_constant_error"
     truth = RIG.with_values({name: value * RIG[name]}).with_effect(cause, gain=0.88)
-    record = excited(truth, "chirp", sensors=7, duration=12.0, **ASKED)
+    record = excited(truth, "chirp", sensors=7, duration=6.0, **ASKED)
     found = diagnose([record], RIG, settings=trying(cause, rival, "current_loop_lag", "coulomb_friction"))
     (named,) = found.causes
     assert named.status == "one_of"
