@@ -24,10 +24,10 @@ pytestmark = pytest.mark.usefixtures("brief_next_run")
 SWEEP = {"duration": 6.0, "noise": 0.0, "low": 0.2, "high": 30.0}
 
 
-def slow_sweep():
-    """Return a sine of 30 N m from 0.1 to 10 Hz in 10 s."""
-    t = np.arange(round(10.0 * RATE)) / RATE
-    growth = np.log(100.0) / 10.0
+def slow_sweep(seconds=10.0):
+    """Return a sine of 30 N m from 0.1 to 10 Hz."""
+    t = np.arange(round(seconds * RATE)) / RATE
+    growth = np.log(100.0) / seconds
     return 30.0 * np.sin(2.0 * np.pi * 0.1 * np.expm1(growth * t) / growth)
 
 
@@ -96,7 +96,7 @@ def test_strong_cogging_is_named_with_its_size():
     """A free simulation left 120 times the noise: a 502:1 gear settles in other detents than the real one."""
     amplitude, cycles, rng = 4.0, 8.0, np.random.default_rng(2)
     ripple = {"amplitude": amplitude, "cycles_per_revolution": cycles, "phase": float(rng.uniform(-3.0, 3.0))}
-    record = record_run(hide(drawn_bench(rng), "torque_ripple", ripple), 2001, "chirp_noise", 5.0)
+    record = record_run(hide(drawn_bench(rng), "torque_ripple", ripple), 2001, "chirp_noise", 4.2)
     diagnosis = diagnose([record], RIG, settings=trying("torque_ripple", "backlash"))
     assert diagnosis.causes[0].name == "torque_ripple"
     sizes = diagnosis.causes[0].parameters
@@ -131,7 +131,7 @@ def test_a_mode_above_the_band_is_told_from_a_base_that_moves():
     parameters = drawn_parameters("structural_resonance", "strong", rng)
     assert parameters["frequency"] > 60.0
     bench = hide(drawn_bench(rng), "structural_resonance", parameters)
-    record = record_command(bench, slow_sweep(), rng)
+    record = record_command(bench, slow_sweep(20.0), rng)
     settings = trying("structural_resonance", "base_compliance")
     (cause,) = diagnose([record], RIG, settings=settings).causes
     assert (cause.name, cause.status) == ("structural_resonance", "confirmed")
