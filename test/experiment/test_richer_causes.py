@@ -120,7 +120,7 @@ def test_what_a_richer_cause_adds_is_rated_within_what_is_known(stuck):
 
 def test_a_stuck_joint_is_not_decided_by_what_does_not_free_it(stuck, log):
     sure = replace(stuck, probability={"coulomb_friction": 0.96, "stribeck_friction": 0.04})
-    asked = replace(ASKED, limits=RunLimits(torque=0.6), longest=0.5)
+    asked = replace(ASKED, limits=RunLimits(torque=0.6), longest=1.0)
     outcome = Campaign(RIG, FRICTION, asked, lambda _: None).go([log], sure)
     assert outcome.end == "undecidable"
     assert outcome.shared is not None and outcome.shared.names == FRICTION
