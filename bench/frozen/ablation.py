@@ -72,6 +72,7 @@ FITS, FORWARD = "step_fits:StepFits", "stepwise:ForwardStep"
 BRANCHES: Mapping[str, Branch] = {
     "ripple on the measured angle": Branch({f"{FITS}.on_measured_angle": _nothing}),
     "starts from stated values": Branch({f"{FITS}._from_stated_values": _nothing}),
+    "pairs": Branch({f"{FORWARD}._pairs": _nothing}),
     "pairs nearer the rig": Branch({f"{FORWARD}._pairs_nearer_the_rig": _nothing}),
     "a tenth of the guess": Branch({"step_fits:_other_guesses": _nothing}),
     "common clock into the delay": Branch({"candidate:with_clocks_in_delays": lambda solution: None}),

@@ -238,6 +238,11 @@ class StepFits:
         screened = [s for s in self.pools.fits.map(try_effect, range(len(effects))) if s is not None]
         return sorted(screened, key=lambda s: s.cost)
 
+    def with_typical(self, screened: ScreenedEffect) -> Solution:
+        """Return the current model on the pieces with an effect of typical size, not fitted."""
+        base, effect = self.on_pieces, screened.effect
+        return solve(*add_effect(base.problem, base.theta, effect, dict(effect.typical)), iterations=0)
+
     def with_fitted(self, screened: ScreenedEffect) -> Solution:
         """Return the model on the pieces with an effect as fitted so far."""
         return solve(screened.problem, screened.theta, iterations=0)

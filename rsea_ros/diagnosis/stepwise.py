@@ -1,14 +1,14 @@
 """Stepwise selection: from the re-fitted nominal model, cause after cause, until no effect helps any more.
 
 All are screened and the promising fitted on short pieces of the data; the best of those are fitted to all
-training blocks. Where none brings the model near the floor, effects of the rotor's angle are tried on the
-measured one. Two at once are tried where the best fits only far from the rig.
+training blocks. Where none is acceptable, effects on the measured rotor angle are tried, then two at once.
+Two at once are also tried where the best fits only far from the rig.
 
 Models are fitted to the training blocks and chosen on the validation blocks; the test blocks are not touched.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -34,7 +34,7 @@ from rsea_ros.effects.catalogue import look_alikes
 from rsea_ros.effects.effect import Effect
 from rsea_ros.identification.confidence import is_off_rig
 from rsea_ros.identification.problem import Problem
-from rsea_ros.identification.solver import Pools
+from rsea_ros.identification.solver import Pools, Solution
 from rsea_ros.identification.unknowns import LOOP_CLOCK, theta_with, vector_of
 from rsea_ros.model.rig import Rig
 from rsea_ros.progress import Progress
@@ -69,7 +69,7 @@ class ForwardStep:
     settings: DiagnosisSettings
 
     def run(self) -> StepResult:
-        """Try every effect, and two at once where the best leaves the rig."""
+        """Try every effect, and two at once where none helps alone."""
         screened = self.fits.screen(self.fits.on_pieces)
         close = self._fit_to_pieces(screened)
         finalists = self._finalists(screened, close)
@@ -78,7 +78,7 @@ class ForwardStep:
             is_far_from_floor(m, self.settings) for m in self._acceptable(models)
         ):
             models += self.fits.on_measured_angle()
-        contenders = self._acceptable(models)
+        contenders = self._acceptable(models) or self._pairs(finalists)
         chosen = self._choose(contenders)
         if chosen is not None and is_off_rig(chosen.solution):
             contenders += self._pairs_nearer_the_rig(chosen, close)
@@ -128,6 +128,12 @@ class ForwardStep:
         ]
         return [*near, *(s for s in late if s.cost < rule.behind_first * best)]
 
+    def _pairs(self, firsts: Sequence[ScreenedEffect]) -> list[Candidate]:
+        """Return acceptable models with two more effects, for where none helps alone and much is left."""
+        if not self.fits.is_far:
+            return []
+        return self._pairs_beside(firsts, self.fits.with_typical)
+
     def _pairs_nearer_the_rig(self, chosen: Candidate, close: Sequence[ScreenedEffect]) -> list[Candidate]:
         """Return acceptable models with two more effects, the first of which leaves the rig's values less.
 
@@ -136,12 +142,18 @@ class ForwardStep:
         most = 0.5 * self.fits.on_pieces.cost
         away = {s.name: prior_cost(s.problem, s.theta) for s in close if s.cost < most}
         nearer = [s for s in close if away.get(s.name, math.inf) < 0.5 * chosen.prior_cost]
+        return self._pairs_beside(sorted(nearer, key=lambda s: away[s.name]), self.fits.with_fitted)
+
+    def _pairs_beside(
+        self, firsts: Sequence[ScreenedEffect], with_first: Callable[[ScreenedEffect], Solution]
+    ) -> list[Candidate]:
+        """Return acceptable models with an effect beside one of the first. with_first: on the pieces."""
         fits = self.fits
         if len(self.current.causes) > 1:  # beside more of them, a pair fits whatever is left
             return []
         pairs: list[ScreenedEffect] = []
-        for first in sorted(nearer, key=lambda s: away[s.name])[: _PAIRED]:
-            pairs += fits.fit_pieces(fits.screen(fits.with_fitted(first))[: _PAIRED])
+        for first in firsts[: _PAIRED]:
+            pairs += fits.fit_pieces(fits.screen(with_first(first))[: _PAIRED])
         promising = sorted(
             (p for p in pairs if p.cost < _HOPE_OF_TWO * fits.on_pieces.cost), key=lambda p: p.cost
         )
