@@ -49,6 +49,7 @@ def test_a_bomb_of_aliases_is_refused_at_once():
         ("12", 12),
         ("1e-3", 1e-3),
         ("5.0e-6", 5e-6),
+        (".5", 0.5),
         ("yes", True),
         ("False", False),
         ("~", None),

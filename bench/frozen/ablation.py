@@ -70,15 +70,12 @@ def _was_dropped(result: Candidate | None, self: ReducedModels, model: Candidate
 
 FITS, FORWARD = "step_fits:StepFits", "stepwise:ForwardStep"
 BRANCHES: Mapping[str, Branch] = {
-    "overlooked by the pieces": Branch({f"{FITS}.find_overlooked": _nothing}),
     "ripple on the measured angle": Branch({f"{FITS}.on_measured_angle": _nothing}),
     "starts from stated values": Branch({f"{FITS}._from_stated_values": _nothing}),
     "pairs": Branch({f"{FORWARD}._pairs": _nothing}),
     "pairs nearer the rig": Branch({f"{FORWARD}._pairs_nearer_the_rig": _nothing}),
     "a tenth of the guess": Branch({"step_fits:_other_guesses": _nothing}),
     "common clock into the delay": Branch({"candidate:with_clocks_in_delays": lambda solution: None}),
-    "a time within the clocks is no cause": Branch({
-        "candidate:is_within_clocks": _no, "backward_elimination:is_within_clocks": _no}),
     "quick replacement dropped": Branch(
         {"backward_elimination:ReducedModels._with": _fitted_on}, acts=_was_dropped),
     "close rivals fitted to the end": Branch(

@@ -3,14 +3,15 @@
 Each takes a channel and returns which samples are bad, shape (n,). A sample that is masked is never fitted.
 """
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from rsea_ros.checks import frozen as freezes
 from rsea_ros.checks.expected import Side, is_commanded, is_still, sides
-from rsea_ros.checks.pairs import Pair, pairs_of
+from rsea_ros.checks.pairs import Pair, each_pair, pairs_of
 from rsea_ros.checks.stamp_findings import rounded_stamps
 from rsea_ros.identification.noise import FEW, step_of
 from rsea_ros.model.extent import is_too_fast
@@ -32,7 +33,7 @@ def dead_channels(
     compared: Mapping[str, Side],
     rig: Rig,
     frozen: Collection[str] = (),
-    pairs: Sequence[Pair] | None = None,
+    pairs: Iterable[Pair] | None = None,
 ) -> list[Fault]:
     """Return a fault for every sensor that does not measure. record: finite values, rising stamps.
 
@@ -45,14 +46,20 @@ def dead_channels(
     if not is_commanded(record):
         return []
     constant = {n: _constant(record[n], n, compared.get(n), rig) for n in record.channels if n in MEASURED}
-    pairs = pairs_of(record, rig) if pairs is None else pairs
+    doubtful = {n for n, detail in constant.items() if not detail and n not in frozen}
+    known: list[Pair] = []
+    for pair in each_pair(record, rig) if pairs is None else pairs:
+        known.append(pair)
+        if not (pair.unrelated or pair.coherence < _NOTHING):
+            doubtful -= {pair.law.x, pair.law.y}
+        if not doubtful:  # the first laws tie all channels of a sound record
+            break
     nothing_moves = is_still(record)
-    linked = {n for p in pairs if p.coherence > _LINKED and not p.unrelated for n in (p.law.x, p.law.y)}
-    for n in constant:
-        of = [p for p in pairs if n in (p.law.x, p.law.y) and (p.coherence or p.unrelated)]
-        alone = of and all(p.unrelated or p.coherence < _NOTHING for p in of)
+    linked = {n for p in known if p.coherence > _LINKED and not p.unrelated for n in (p.law.x, p.law.y)}
+    for n in (n for n in constant if n in doubtful):
+        alone = any(n in (p.law.x, p.law.y) and (p.coherence or p.unrelated) for p in known)
         alone = alone and (len(linked - {n}) > 1 or (not linked and nothing_moves))
-        if alone and not constant[n] and n not in frozen and _shows(n, compared.get(n), rig):
+        if alone and _shows(n, compared.get(n), rig):
             constant[n] = "noise that has nothing to do with the other channels"
     return [Fault("dead_channel", n, 1.0, detail) for n, detail in constant.items() if detail]
 
@@ -97,14 +104,19 @@ class Checked:
     """A record with its faults: finite, rising stamps; and which samples must not count, by channel.
 
     compared: the record beside the rig's simulation, where nothing was masked or left out; None elsewhere.
-    pairs: what its channels say of each other.
+    measured: what its channels are compared in, and with which rig; None for a record of no commands.
     """
 
     record: Record
     masked: Mapping[str, BoolArray]
     faults: tuple[Fault, ...]
     compared: Mapping[str, Side] | None = None
-    pairs: tuple[Pair, ...] = ()
+    measured: tuple[Record, Rig] | None = None
+
+    @cached_property
+    def pairs(self) -> tuple[Pair, ...]:
+        """What its channels say of each other."""
+        return pairs_of(*self.measured) if self.measured is not None else ()
 
 
 def check(record: Record, rig: Rig) -> Checked:
@@ -122,8 +134,8 @@ def check(record: Record, rig: Rig) -> Checked:
     finite = {n: not_finite(c, n) for n, c in repaired.channels.items()}
     filled = _fill(repaired, finite)
     compared = sides(filled, rig) if is_commanded(filled) else {}
-    pairs = pairs_of(filled, rig) if is_commanded(filled) and not is_too_fast(filled) else ()
-    dead = dead_channels(filled, compared, rig, frozen_ones, pairs)
+    measured = (filled, rig) if is_commanded(filled) and not is_too_fast(filled) else None
+    dead = dead_channels(filled, compared, rig, frozen_ones, None if measured else ())
     repaired = _without(repaired, {f.channel for f in dead})
     known = {(f.kind, f.channel) for f in faults}
     faults += [*clock_faults, *(f for f in dead if (f.kind, f.channel) not in known)]
@@ -133,7 +145,7 @@ def check(record: Record, rig: Rig) -> Checked:
     repaired, masked = _without_unknown_commands(repaired, masked)
     alive = _without(repaired, {n for n, bad in masked.items() if bad.all() and n != "command"})
     whole = not dead and not any(bad.any() for bad in masked.values())
-    return Checked(_fill(alive, masked), masked, tuple(faults), compared if whole else None, pairs)
+    return Checked(_fill(alive, masked), masked, tuple(faults), compared if whole else None, measured)
 
 
 def _without_unknown_commands(

@@ -16,7 +16,7 @@ value of the rig. Where the windows agree, the pair has one part; elsewhere one 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from hashlib import blake2b
@@ -198,17 +198,25 @@ def _of_torque(torque: str, rig: Rig, m: Mechanics, held: bool) -> list[Law]:
 def pairs_of(record: Record, rig: Rig) -> tuple[Pair, ...]:
     """Return what each pair of channels says, a part for each span in which it says the same.
 
-    record: finite values, rising stamps. A verb checks its record twice, before the fit and in it: what the
-    last few asked for is kept.
+    record: finite values, rising stamps.
     """
-    with np.errstate(all="ignore"):
-        asked = tuple(laws(record, rig))
-        parts = ((n.encode(), c.t.tobytes(), c.y.tobytes()) for n, c in record.channels.items())
-        known = repr(rig.filters()).encode() if rig.filters() else b""
-        kept = _kept(asked, blake2b(known + b"".join(chain.from_iterable(parts))).digest())
-        if not kept:
-            kept.append(tuple(p for law in asked for p in _parts(_behind_all(record, law, rig), law)))
-        return kept[0]
+    return tuple(each_pair(record, rig))
+
+
+def each_pair(record: Record, rig: Rig) -> Iterator[Pair]:
+    """Yield `pairs_of` law by law, each measured when it is asked for: who needs a few goes no further.
+
+    A verb checks its record twice, before the fit and in it: what the last few asked for is kept.
+    """
+    asked = laws(record, rig)
+    parts = ((n.encode(), c.t.tobytes(), c.y.tobytes()) for n, c in record.channels.items())
+    known = repr(rig.filters()).encode() if rig.filters() else b""
+    kept = _kept(asked, blake2b(known + b"".join(chain.from_iterable(parts))).digest())
+    for law in asked:
+        if law not in kept:
+            with np.errstate(all="ignore"):
+                kept[law] = _parts(_behind_all(record, law, rig), law)
+        yield from kept[law]
 
 
 def _behind_all(record: Record, law: Law, rig: Rig) -> Record:
@@ -224,9 +232,9 @@ def _behind_all(record: Record, law: Law, rig: Rig) -> Record:
 
 
 @lru_cache(maxsize=32)
-def _kept(asked: tuple[Law, ...], content: bytes) -> list[tuple[Pair, ...]]:
-    """Return where the pairs of a record are kept, by their laws and its content."""
-    return []
+def _kept(asked: tuple[Law, ...], content: bytes) -> dict[Law, list[Pair]]:
+    """Return where the pairs of a record are kept by law, for all its laws and its content."""
+    return {}
 
 
 def _parts(record: Record, law: Law) -> list[Pair]:

@@ -22,6 +22,7 @@ learned by least squares with forgetting, from what the controller has sent:
 """
 
 import math
+from functools import lru_cache
 
 import numpy as np
 
@@ -52,9 +53,9 @@ class Prediction:
     def start(self, torque: float) -> None:
         """Begin at rest at a torque, N m."""
         self._state: FloatArray = np.array([torque, 0.0, 0.0])
-        self._smooth, self._off = np.full(2, torque), 0.0
+        self._smooth, self._off = (torque, torque), 0.0
         self._last, self._surprise, self._change, self.trust = torque, 0.0, 0.0, 1.0
-        self._promised, self._rest = torque, np.zeros(2)
+        self._promised, self._rest = torque, (0.0, 0.0)
 
     def expected(self, samples: int) -> float:
         """Return the torque, N m, that is expected a number of samples after the last one."""
@@ -83,11 +84,10 @@ class Prediction:
             surprise = desired - expected[0]
             self._state = expected + gains_of(self._memory**interval, interval) * surprise
             self._trust(surprise, desired)
-        rate, second = self._state[1:]
-        j, needed = AHEAD - off + np.arange(samples + 1), AHEAD + samples - 1
-        j = np.minimum(j, needed) - COASTED * np.expm1(-np.maximum(j - needed, 0.0) / COASTED)
-        along: FloatArray = self._low_pass(desired, samples + 1)
-        along += self.trust * (desired + j * rate + 0.5 * j * j * second - along)
+        (rate, second), (j, half_square) = self._state[1:], instants(off, samples)
+        passed = self._passed(*self._smooth, desired, samples + 1)
+        self._smooth, along = passed[0], np.array([second for _, second in passed])
+        along += self.trust * (desired + j * rate + half_square * second - along)
         return self._eased(along, 1.0 - 1.0 / max(interval, 1.0))[:samples]
 
     def _eased(self, along: FloatArray, part: float) -> FloatArray:
@@ -95,26 +95,23 @@ class Prediction:
 
         A surprise after a pause is otherwise a jump.
         """
-        rest = self._rest + part * (self._promised - along[0] - self._rest[1])
-        passed = self._passed(rest, 0.0, len(along))
+        first, second = self._rest
+        off = part * (self._promised - float(along[0]) - second)
+        passed = self._passed(first + off, second + off, 0.0, len(along))
         self._rest = passed[0]
-        along += np.append(rest[1], passed[:-1, 1])
+        along += [second + off, *(after for _, after in passed[:-1])]
         self._promised = float(along[1])
         return along
 
-    def _low_pass(self, desired: float, samples: int) -> FloatArray:
-        """Return the low pass of the desired torque at this sample, and its course from there on."""
-        passed = self._passed(self._smooth, desired, samples)
-        self._smooth = passed[0]
-        return np.array(passed[:, 1])
-
-    def _passed(self, state: FloatArray, towards: float, samples: int) -> FloatArray:
-        """Return both stages of the low pass in the samples to come of a constant input, (samples, 2)."""
-        path, (first, second) = np.empty((samples, 2)), state.tolist()
-        for k in range(samples):
+    def _passed(
+        self, first: float, second: float, towards: float, samples: int
+    ) -> list[tuple[float, float]]:
+        """Return both stages of the low pass in the samples to come of a constant input."""
+        path = []
+        for _ in range(samples):
             first += self._soft * (towards - first)
             second += self._soft * (first - second)
-            path[k] = first, second
+            path.append((first, second))
         return path
 
     def _trust(self, surprise: float, desired: float) -> None:
@@ -125,11 +122,21 @@ class Prediction:
         self.trust = 1.0 / (1.0 + min(share, 1e6) ** 2) if self._change > 0.0 else 1.0
 
 
+@lru_cache(maxsize=64)
+def instants(off: float, samples: int) -> tuple[FloatArray, FloatArray]:
+    """Return the samples j over which a course goes on, as it comes to rest, and j^2 / 2."""
+    j, needed = AHEAD - off + np.arange(samples + 1), AHEAD + samples - 1
+    j = np.minimum(j, needed) - COASTED * np.expm1(-np.maximum(j - needed, 0.0) / COASTED)
+    return j, 0.5 * j * j
+
+
+@lru_cache(maxsize=64)
 def course(interval: float) -> FloatArray:
     """Return A over an interval, samples."""
     return np.array([[1.0, interval, 0.5 * interval**2], [0.0, 1.0, interval], [0.0, 0.0, 1.0]])
 
 
+@lru_cache(maxsize=64)
 def gains_of(memory: float, interval: float = 1.0) -> FloatArray:
     """Return g for a memory over an interval (samples), from 0 (the last three values) to below 1."""
     fresh = 1.0 - memory

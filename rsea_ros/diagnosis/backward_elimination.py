@@ -14,7 +14,6 @@ from rsea_ros.diagnosis.candidate import (
     effect_size,
     fit_candidate,
     is_apart,
-    is_within_clocks,
     without_effect,
 )
 from rsea_ros.diagnosis.criteria import (
@@ -176,12 +175,11 @@ def is_listed(effect: Effect, name: str) -> bool:
 
 
 def without_redundant(selection: Selection, models: ReducedModels) -> Selection:
-    """Remove every accepted cause without which the others do as well, or that a clock's error may make."""
+    """Remove every accepted cause without which the others do as well."""
     last = selection.last
     for name, rest in models.without(last).items() if len(last.causes) > 1 else ():
-        is_nothing = is_within_clocks(last.solution, name)
-        if is_nothing or not models.is_needed(last, rest):
-            trial = trial_of(last, name, rest, "at_bound" if is_nothing else "redundant")
+        if not models.is_needed(last, rest):
+            trial = trial_of(last, name, rest, "redundant")
             return without_redundant(_replace(selection, rest, trial), models)
     return selection
 

@@ -17,7 +17,6 @@ from rsea_ros.identification.solver import Map, Solution, serial, solve
 from rsea_ros.identification.unknowns import LOOP_CLOCK, Unknown
 from rsea_ros.model.drive import Drive, coarser, finer
 from rsea_ros.records.record import FloatArray
-from rsea_ros.records.statistics import Z95
 
 
 def on_blocks(
@@ -320,19 +319,9 @@ def prior_cost(problem: Problem, theta: FloatArray) -> float:
 
 
 def is_at_bound(solution: Solution, name: str, near: float) -> bool:
-    """Return whether an effect's main parameter lies at a bound, within a share `near` of its span.
-
-    A time within the clocks' error is at its bound too.
-    """
+    """Return whether an effect's main parameter lies at a bound, within a share `near` of its span."""
     unknown, at = _main(solution, name)
-    return is_within_clocks(solution, name) or unknown.is_near_bound(at, near)
-
-
-def is_within_clocks(solution: Solution, name: str) -> bool:
-    """Return whether an effect is a time that an error of a clock can imitate: no record excludes zero."""
-    unknown, at = _main(solution, name)
-    error = Z95 * min(solution.problem.rig.clock_doubt(n) for n in solution.problem.channels)
-    return unknown.unit == "s" and abs(unknown.outer(at) - effect_named(name).main.null) < error
+    return unknown.is_near_bound(at, near)
 
 
 def _main(solution: Solution, name: str) -> tuple[Unknown, float]:

@@ -19,16 +19,14 @@ from rsea_ros.diagnosis.candidate import (
     fit_candidate,
     in_units_of,
     is_apart,
-    paid_for,
     refit,
     with_clocks,
     with_doubled_step,
     without_clocks,
 )
-from rsea_ros.diagnosis.criteria import is_equally_good, is_far_from_floor, preference
-from rsea_ros.diagnosis.data_split import VALIDATION, short_pieces_of
+from rsea_ros.diagnosis.criteria import is_equally_good, is_far_from_floor
+from rsea_ros.diagnosis.data_split import short_pieces_of
 from rsea_ros.diagnosis.initial_guess import initial_guesses, stated_starts, view_for
-from rsea_ros.diagnosis.score import Score, score_on
 from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.effects.effect import Effect
 from rsea_ros.effects.guess import Guess
@@ -257,14 +255,6 @@ class StepFits:
         """Fit screened effects to all training blocks."""
         return list(self.pools.fits.map(self._fit_all, screened))
 
-    def find_overlooked(self, left_out: Sequence[ScreenedEffect]) -> list[ScreenedEffect]:
-        """Return those of the effects left out that surely help on the validation blocks, as fitted so far.
-
-        The pieces are few: where an effect is small, it is chance in which of them it shows.
-        """
-        helps = self.pools.fits.map(self._surely_helps, left_out)
-        return [s for s, is_sure in zip(left_out, helps, strict=True) if is_sure]
-
     def on_measured_angle(self) -> list[Candidate]:
         """Return models with an effect of the rotor's angle, simulated on the measured angle.
 
@@ -333,20 +323,6 @@ class StepFits:
             self.current.cases, self.settings, self.pools.run, self.current.validation,
             iterations=QUICK_FIT, is_quick=self.is_far,
         )  # fmt: skip
-
-    def _surely_helps(self, screened: ScreenedEffect) -> bool:
-        """Return whether an effect with its fit to the pieces does better on the validation blocks."""
-        scores = self._scores(screened)
-        problem, _ = self.complete(screened)
-        extra, rule = paid_for(problem) - self.current.parameters, self.settings.acceptance
-        return any(preference(s, self.current.validation, extra, rule).sure for s in scores)
-
-    def _scores(self, screened: ScreenedEffect) -> list[Score]:
-        """Return the scores on the validation blocks of an effect with its fit to the pieces."""
-        problem, theta = self.complete(screened)
-        outputs = [problem.outputs(start) for start in self._starts(problem, theta)]
-        cases, blocks = self.current.cases, self.settings.blocks
-        return [score_on(problem, cases, VALIDATION, simulated, blocks) for simulated in outputs]
 
     def _starts(self, problem: Problem, theta: FloatArray) -> list[FloatArray]:
         """Return the starts of a full fit: from the pieces, or from the current model beside the effect.

@@ -1,8 +1,8 @@
 """Stepwise selection: from the re-fitted nominal model, cause after cause, until no effect helps any more.
 
 All are screened and the promising fitted on short pieces of the data; the best of those are fitted to all
-training blocks. Where none is acceptable, effects that the pieces overlooked are tried, then effects on the
-measured rotor angle, then two at once. Two at once are also tried where the best fits only far from the rig.
+training blocks. Where none is acceptable, effects on the measured rotor angle are tried, then two at once.
+Two at once are also tried where the best fits only far from the rig.
 
 Models are fitted to the training blocks and chosen on the validation blocks; the test blocks are not touched.
 """
@@ -74,10 +74,6 @@ class ForwardStep:
         close = self._fit_to_pieces(screened)
         finalists = self._finalists(screened, close)
         models = self.fits.fit_all(finalists)
-        if not self._acceptable(models):
-            overlooked = self.fits.find_overlooked(_others(screened, finalists))
-            finalists += overlooked
-            models += self.fits.fit_all(overlooked)
         if self.fits.is_far and all(
             is_far_from_floor(m, self.settings) for m in self._acceptable(models)
         ):

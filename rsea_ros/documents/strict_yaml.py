@@ -60,6 +60,7 @@ _DOUBTFUL = {
     "a number with underscores": re.compile(r"[-+]?[0-9.]*[0-9]_[0-9_.]*([eE][-+]?[0-9]+)?"),
     "a date": re.compile(r"[0-9]{4}-[0-9]{1,2}-[0-9]{1,2}([Tt ].*)?"),
 }
+_BEGINS_NUMBER = frozenset("+-.0123456789")
 _LONGEST_NUMBER = 400
 """Characters. Python refuses to read integers of more than 4300 digits, and a double holds 309."""
 Way = tuple[str, ...]
@@ -208,6 +209,8 @@ def _scalar(event: yaml.ScalarEvent, key: str) -> Any:
         return text
     if text in _CONSTANTS:
         return _CONSTANTS[text]
+    if text[0] not in _BEGINS_NUMBER:  # as nearly all do
+        return text
     for kind, pattern in _DOUBTFUL.items():
         if pattern.fullmatch(text):
             expected = "expected a decimal number, or a text in quotes"

@@ -12,12 +12,16 @@ from rsea_ros.hardware.limits import Limits, Rating, check_limits
 from rsea_ros.hardware.netft.sensor import ForceTorqueSensor, SensorConnection
 from rsea_ros.hardware.protection import Protection
 
+ZEROS = CONFIGURE, MOTOR, ROBOTIS = "configure", "motor", "robotis"
+"""Where angles are zero."""
+
 
 class MotorNetft:
     """Motor and sensor behind the Device interface.
 
     Angles count from where the drive stands when the device is opened: torque off, the spring at rest.
-    absolute: they count from the motor's own zero instead, its encoder's with its homing offset.
+    zero: "motor": they count from the motor's own zero instead, its encoder's with its homing offset, and the
+    deflection from that of the spring's encoder; another: the motor knows which zero, for its angle alone.
     motor: alone on its port, or one of several. encoder: of the spring, on the port of a Dynamixel.
     stiffness: of the rig's spring, N m/rad, which the limits are checked against.
     """
@@ -29,13 +33,13 @@ class MotorNetft:
         limits: Limits,
         stiffness: float,
         *,
-        absolute: bool = False,
+        zero: str = CONFIGURE,
         encoder: BusEncoder | None = None,
     ) -> None:
         self._motor = motor
         self._encoder = encoder
         self._sensor = ForceTorqueSensor(sensor) if sensor is not None else None
-        self._limits, self._stiffness, self._absolute = limits, stiffness, absolute
+        self._limits, self._stiffness, self._zero = limits, stiffness, zero
         self._epoch, self.origin = 0, 0.0
         self._waiting: list[tuple[int, Wrench]] = []
         self._trouble = ""
@@ -61,9 +65,9 @@ class MotorNetft:
             check_limits(self._limits, self._motor.torque_limit, self._stiffness)
             self._motor.check(self._limits)
             sample = self._motor.patiently(self._motor.read)
-            self.origin = 0.0 if self._absolute else sample.position
+            self.origin = sample.position if self._zero == CONFIGURE else 0.0
             if self._encoder is not None:
-                self._encoder.open(sample, absolute=self._absolute)
+                self._encoder.open(sample, absolute=self._zero == MOTOR)
             if self._sensor is not None:
                 self._sensor.open()
         except Exception:

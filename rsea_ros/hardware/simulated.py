@@ -3,6 +3,7 @@
 import math
 import time
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from rsea_ros.hardware.limits import Rating
 from rsea_ros.hardware.protection import PROCESS, Protection
 from rsea_ros.model.drive import steps_per_sample
 from rsea_ros.model.rig import Rig, Sensor
-from rsea_ros.model.simulation import Filters, build, measure, run
+from rsea_ros.model.simulation import Filters, Sensors, build, run
 from rsea_ros.model.step import OUTPUTS
 from rsea_ros.records.record import FloatArray
 
@@ -36,7 +37,8 @@ class SimulatedDevice:
         self, rig: Rig, rate: float, *, seed: int = 0, noise: bool = True, duration: float = 60.0,
         clock: Callable[[], int] | None = None,
     ) -> None:  # fmt: skip
-        self._rig, self._noise, self._clock = rig, noise, clock or _steady_clock()
+        self._rig, self._clock = rig, clock or _steady_clock()
+        self._sensors = Sensors(rig if noise else replace(rig, sensors={}))
         self._rng = np.random.default_rng(seed)
         self._period, self._per_second = 1.0 / rate, rate * steps_per_sample(1.0 / rate)
         self._duration = duration
@@ -67,16 +69,16 @@ class SimulatedDevice:
     def read(self) -> State:
         """Advance to now and measure."""
         self._advance()
-        values = {name: self._measure(name, self._values[i]) for i, name in enumerate(OUTPUTS)}
+        readings = self._sensors.read(self._values, self._rng, self._filters)
+        position, velocity, torque, ft, deflection = readings.tolist()
         stamp = self._instant(self._steps)
-        wrench = None if self._rig.rigid_spring else (0.0, 0.0, 0.0, 0.0, 0.0, values["ft"])
-        deflection = values["deflection"] if "deflection" in self._rig.sensors else math.nan
-        moved = values["position"], values["velocity"], values["motor_torque"]
-        return State(stamp, *moved, stamp, wrench, deflection=deflection)
+        wrench = None if self._rig.rigid_spring else (0.0, 0.0, 0.0, 0.0, 0.0, ft)
+        deflection = deflection if "deflection" in self._rig.sensors else math.nan
+        return State(stamp, position, velocity, torque, stamp, wrench, deflection=deflection)
 
     def write(self, torque: float) -> None:
         """Hold a torque (N m) from now on. Raises DeviceError for one that is not finite."""
-        if not np.isfinite(torque):
+        if not math.isfinite(torque):
             raise DeviceError(f"torque of {torque} N·m, expected a finite value")
         self._writes.append((self._clock(), float(torque)))
 
@@ -141,9 +143,6 @@ class SimulatedDevice:
             self._writes = []
         self._torque = last
         return held
-
-    def _measure(self, channel: str, value: FloatArray) -> float:
-        return float(measure(self._rig, channel, value, self._rng, self._filters) if self._noise else value)
 
 
 def _steady_clock() -> Callable[[], int]:

@@ -160,7 +160,7 @@ class Witnesses:
 
     def _followed(self, window: Window, low: Signals) -> Window:
         part = min(max(1.0 / (window.readings + 1), self._period / MEMORY), 1.0)
-        squares = Signals(*(x * x for x in low))
+        squares = Signals._make([x * x for x in low])
         mean, square = _nearer(window.mean, low, part), _nearer(window.square, squares, part)
         return Window(window.readings + 1, mean, square)
 
@@ -174,11 +174,12 @@ class Witnesses:
         still = self._parts(zeroed, sizes, abs(mean.way) + 1.0 - window.square.way)
         moving = self._parts(swing, swing, 1.0)
         motor, spring = map(max, zip(still, moving, strict=True))
-        x, of = (zeroed, "") if max(still) > max(moving) else (swing, " RMS")
         self._off = self._off + 1 if max(motor, spring) > 1.0 else 0
-        told = self._told(x if of else x._replace(spring=mean.spring), of)
-        lasts = self._off * self._period > LASTING
-        self.words = f"{told} contradict each other, expected them alike" if lasts else ""
+        self.words = ""
+        if self._off * self._period > LASTING:
+            stands = max(still) > max(moving)
+            told = self._told(mean) if stands else self._told(swing, " RMS")
+            self.words = f"{told} contradict each other, expected them alike"
 
     def _told(self, x: Signals, of: str = "") -> str:
         """Return the torques in words. of: what of them, " RMS"."""
@@ -206,4 +207,5 @@ class Witnesses:
 
 def _nearer(signals: Signals, to: Signals, part: float) -> Signals:
     """Return signals that have gone a part of the way, all of it at most, to others."""
-    return Signals(*(x + min(part, 1.0) * (y - x) for x, y in zip(signals, to, strict=True)))
+    share = min(part, 1.0)
+    return Signals._make([x + share * (y - x) for x, y in zip(signals, to, strict=True)])

@@ -7,7 +7,7 @@ import itertools
 import math
 from bisect import bisect_left
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Any
 
@@ -103,7 +103,7 @@ def _beside_mean(within, at):  # type: ignore[no-untyped-def]
     return out
 
 
-NOTHING_WITHIN = np.empty((0, 4))
+NOTHING_WITHIN, NOTHING_HELD = np.empty((0, 4)), np.empty(0)
 
 
 def sample(
@@ -327,8 +327,7 @@ def _middles(ends: FloatArray) -> FloatArray:
 def run(machine: Machine, command: FloatArray, out: FloatArray, *, start: float = 0.0,
         reference: FloatArray | None = None, ridden: FloatArray | None = None) -> None:  # fmt: skip
     """Advance a machine over the steps of `command`, in place; `out` gets OUTPUTS of every step."""
-    empty = np.empty(0)
-    reference, ridden = (empty if v is None else v for v in (reference, ridden))
+    reference, ridden = (NOTHING_HELD if v is None else v for v in (reference, ridden))
     inputs = StepInputs(command, reference, ridden, start, True, NOTHING_WITHIN)
     advance(machine.linear, machine.calls, inputs, StepState(machine.x, machine.table, machine.effect_x), out)
 
@@ -499,6 +498,29 @@ def measure(
     return np.round(noisy / sensor.quantum) * sensor.quantum if sensor.quantum > SMALLEST else noisy
 
 
+class Sensors:
+    """The sensors of a rig, as `measure` reads one: a study takes 50 000 samples, a bench 10 000 a second."""
+
+    def __init__(self, rig: Rig) -> None:
+        self._seen = np.array([k for k, name in enumerate(OUTPUTS) if name in rig.sensors], dtype=np.intp)
+        sensors = [rig.sensors[OUTPUTS[k]] for k in self._seen]
+        self._noises, quanta = np.array([s.noise for s in sensors]), np.array([s.quantum for s in sensors])
+        self._filtered = [i for i, s in enumerate(sensors) if s.filter]
+        self._rounds = quanta > SMALLEST
+        self._quanta = np.where(self._rounds, quanta, 1.0)
+
+    def read(self, true: FloatArray, rng: np.random.Generator, filters: Filters) -> FloatArray:
+        """Return the readings of all of OUTPUTS, of which those without a sensor are the true values."""
+        values: FloatArray = true.copy()
+        if len(self._seen):
+            noise = self._noises * rng.standard_normal(len(self._seen))
+            for i in self._filtered:
+                noise[i] = filters.noise(OUTPUTS[self._seen[i]], noise[i])
+            noisy = values[self._seen] + noise
+            values[self._seen] = np.where(self._rounds, np.rint(noisy / self._quanta) * self._quanta, noisy)
+        return values
+
+
 @dataclass(frozen=True)
 class PlantSample:
     """One measurement of the plant: rad, rad/s, N m, N m (nan without a spring to measure), rad."""
@@ -515,16 +537,10 @@ class Plant:
 
     def __init__(self, rig: Rig, rate: float, *, seed: int = 0, noise: bool = True) -> None:
         """rate: samples a second. Drifts reach their full size in a minute."""
-        self._rig = rig
-        self._seen = [k for k, name in enumerate(OUTPUTS) if noise and name in rig.sensors]
-        sensors = [rig.sensors[OUTPUTS[k]] for k in self._seen]
-        self._noises, quanta = np.array([s.noise for s in sensors]), np.array([s.quantum for s in sensors])
-        self._filtered = [i for i, s in enumerate(sensors) if s.filter]
-        self._rounds = quanta > SMALLEST
-        self._quanta = np.where(self._rounds, quanta, 1.0)
+        self._rig, self._sensors = rig, Sensors(rig if noise else replace(rig, sensors={}))
         self._count = steps_per_sample(1.0 / rate)
         self._step = 1.0 / rate / self._count
-        self._out = np.empty((self._count, len(OUTPUTS)))
+        self._command, self._out = np.empty(self._count), np.empty((self._count, len(OUTPUTS)))
         self._rng = sensor_noise(seed)
         self.reset()
 
@@ -537,15 +553,10 @@ class Plant:
 
     def step(self, command: float) -> PlantSample:
         """Hold a command (N m) for one sample period and return the measurement at its end."""
-        run(self._machine, np.full(self._count, command), self._out, start=self._time)
+        self._command.fill(command)
+        run(self._machine, self._command, self._out, start=self._time)
         self._time += self._count * self._step
         self._filters.apply(self._out)
-        values = self._out[-1]
-        if self._seen:  # as `measure`, of all channels at once: a study takes 50 000 samples
-            noise = self._noises * self._rng.standard_normal(len(self._seen))
-            for i in self._filtered:
-                noise[i] = self._filters.noise(OUTPUTS[self._seen[i]], noise[i])
-            noisy = values[self._seen] + noise
-            values[self._seen] = np.where(self._rounds, np.round(noisy / self._quanta) * self._quanta, noisy)
+        values = self._sensors.read(self._out[-1], self._rng, self._filters)
         position, velocity, torque, ft, deflection = values.tolist()
         return PlantSample(position, velocity, torque, math.nan if self._rig.rigid_spring else ft, deflection)

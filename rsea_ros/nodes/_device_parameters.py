@@ -7,6 +7,7 @@ from rsea_ros.errors import ParameterError
 from rsea_ros.hardware.device import Device
 from rsea_ros.hardware.dynamixel.encoder import LINK, SPRING
 from rsea_ros.hardware.dynamixel.line import Line
+from rsea_ros.hardware.motor_netft import ZEROS
 from rsea_ros.model.rig_limits import POWER, SLEW
 from rsea_ros.nodes._devices import CAN, DYNAMIXEL, Values, device_of, dynamixel_netft, latency_of
 from rsea_ros.nodes._parameters import AXIS, DERIVED, NodeParameter
@@ -25,8 +26,9 @@ MOTOR = (
     NodeParameter("torque_constant", 0.0,
                   "torque at the gear output for a current; 0: that of the model's table",
                   "N m/A", 0.0, 100.0),
-    NodeParameter("position_zero", "configure", choices=("configure", "motor"),
-                  description="where angles are zero: where configure finds it, or the motor's own zero"),
+    NodeParameter("position_zero", ZEROS[0], choices=ZEROS,
+                  description="where angles are zero: where configure finds it, the motor's own zero, or"
+                  " that of ROBOTIS's URDFs"),
     NodeParameter("latency", 0.0,
                   "what adapter and host may add to a reply; 0: by the rate, docs/hardware.md",
                   "s", 0.0, 0.1),

@@ -15,7 +15,7 @@ from rsea_ros.hardware.dynamixel.motor import Motor
 from rsea_ros.hardware.dynamixel.port import BAUD_RATES
 from rsea_ros.hardware.limits import UNRATED, Limits, Rating
 from rsea_ros.hardware.mit_can.motor import CanConnection, MitMotor
-from rsea_ros.hardware.motor_netft import MotorNetft
+from rsea_ros.hardware.motor_netft import CONFIGURE, ROBOTIS, MotorNetft
 from rsea_ros.hardware.netft.sensor import SensorConnection
 from rsea_ros.hardware.outside import outside_device
 from rsea_ros.hardware.witnesses import Actuator, Witnesses
@@ -140,7 +140,7 @@ def _deflects(values: Values, rig: Rig) -> bool:
 
     Between clamped ends it is, as long as it counts from configure, with the spring at rest.
     """
-    counts = values["position_zero"] == "configure" or values["encoder_id"] >= 0
+    counts = values["position_zero"] == CONFIGURE or values["encoder_id"] >= 0
     return counts and rig.clamped == set(END_NAMES)
 
 
@@ -180,7 +180,7 @@ def dynamixel_netft(values: Values, line: Line | None = None) -> Device:
         known = ", ".join(map(str, BAUD_RATES))
         raise ParameterError(f"parameter baud = {values['baud']} bit/s, expected one of {known}")
     alike = ("baud", "model", "torque_constant", "watchdog", "supervisor")
-    own = {name: values[name] for name in alike}
+    own = {name: values[name] for name in alike} | {"urdf_zero": values["position_zero"] == ROBOTIS}
     motor = MotorConnection(values["port"], identity=values["id"], latency=latency_of(values), **own)
     made, encoder = Motor(motor) if line is None else LineMotor(motor, line), _encoder(values)
     return _with_sensor(values, made, BusEncoder(encoder, made.port) if encoder is not None else None)
@@ -207,7 +207,7 @@ def _with_sensor(values: Values, motor: BusMotor, encoder: BusEncoder | None = N
         sensor if values["ft_host"] else None,
         limits_of(values),
         math.inf if rig.rigid_spring else rig["spring.stiffness"],
-        absolute=values["position_zero"] == "motor",
+        zero=values["position_zero"],
         encoder=encoder,
     )
 

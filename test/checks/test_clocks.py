@@ -82,11 +82,11 @@ def test_a_drift_that_turns_the_phases_is_a_fault_with_its_size():
 
 
 def check_drifting(effects, ppm):
-    """Return the check of 15 s of a rig with effects that its model lacks, and an F/T clock that drifts."""
+    """Return the check of 10 s of a rig with effects that its model lacks, and an F/T clock that drifts."""
     rig = RIG
     for name, sizes in effects.items():
         rig = rig.with_effect(name, **sizes)
-    command = 12.0 * np.random.default_rng(3).standard_normal(4200)
+    command = 12.0 * np.random.default_rng(3).standard_normal(2800)
     return check_record(late(rsea.simulate(rig, command, 280.0, seed=3), 0.0, 1e-6 * ppm, "ft"), RIG)
 
 
@@ -192,10 +192,10 @@ def slow(record, hz, seconds, *names):
     )
 
 
-@pytest.mark.parametrize(("name", "hz"), [("motor_torque", 1), ("ft", 10)])
-def test_the_clock_of_a_slow_channel_is_a_number_too(name, hz):
+@pytest.mark.parametrize(("name", "hz", "length"), [("motor_torque", 1, 90.0), ("ft", 10, 30.0)])
+def test_the_clock_of_a_slow_channel_is_a_number_too(name, hz, length):
     """At 1 Hz there were too few samples for a word; 0.73 s at 10 Hz was a dead channel."""
-    findings = check_record(slow(simulate(90.0), hz, -0.73, name), RIG)
+    findings = check_record(slow(simulate(length), hz, -0.73, name), RIG)
     assert off(findings) == {name: pytest.approx(-0.73, abs=0.008)}
     assert not findings.of("dead_channel")
 

@@ -23,14 +23,14 @@ from rsea_ros.records.record import Channel, Fault, Record
 RIG = load_rig("paper_high_impedance")
 BENCH = drawn_bench(np.random.default_rng(2))
 QUIET = BENCH.with_values(ft_noise=0.0, velocity_noise=0.0, motor_noise=0.0)
-N = 280 * 12
-COMMAND = chirp_noise(12.0, np.random.default_rng(3))
-IN_TURNS = (np.arange(N) // 600) % 2 == 0
+N = 280 * 8
+COMMAND = chirp_noise(8.0, np.random.default_rng(3))
+IN_TURNS = (np.arange(N) // 400) % 2 == 0
 
 
 @functools.cache
 def good():
-    return record_run(BENCH, 4, duration=12.0)
+    return record_run(BENCH, 4, duration=8.0)
 
 
 def with_channel(channel, y):
@@ -114,7 +114,7 @@ def test_where_the_driver_had_a_fault_it_is_named_before_the_dead_sensors():
     assert str(refused.value).count("noise that has nothing to do with the other") == 1
 
 
-RATE, LENGTH = 280.0, 12.0
+RATE, LENGTH = 280.0, 8.0
 
 
 @functools.cache
@@ -140,7 +140,7 @@ def frozen_channels(record):
 
 @pytest.mark.parametrize(
     ("names", "span"),
-    [(("position", "velocity", "ft"), (10.5,)), (("position", "ft"), (4.0, 6.0)), (("ft",), (1.0,))],
+    [(("position", "velocity", "ft"), (6.5,)), (("position", "ft"), (4.0, 6.0)), (("ft",), (1.0,))],
 )
 def test_every_channel_of_a_driver_that_stops_is_named(names, span):
     assert frozen_channels(freeze(run(), names, *span)) == set(names)

@@ -186,7 +186,7 @@ def folder(tmp_path_factory):
     """A bag of a bench with a spring 30 % stiffer than the default rig's, and the rig of that bench."""
     place = tmp_path_factory.mktemp("bench")
     bench = load_rig(RIG).with_values({"spring.stiffness": TRUE})
-    command = 15.0 * np.random.default_rng(4).standard_normal(2800)
+    command = 15.0 * np.random.default_rng(4).standard_normal(1400)
     write_record(rsea.simulate(bench, command, 280.0, seed=4), place / "run.mcap")
     save_rig(bench, place / "mine.yaml")
     return place
@@ -245,7 +245,7 @@ ASKED = "are the stamps in s"
 
 @functools.cache
 def run_of(rig, unit, rate=280.0):
-    size, n = 0.3 if rig == "pd_joint" else 10.0, min(int(5 * rate), 10_000)
+    size, n = 0.3 if rig == "pd_joint" else 10.0, min(int(5 * rate), 7_000)
     record = rsea.simulate(rig, size * np.random.default_rng(4).standard_normal(n), rate, seed=4)
     return record.with_channels(**{n: Channel(unit * c.t, c.y) for n, c in record.channels.items()})
 

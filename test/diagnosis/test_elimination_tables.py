@@ -199,14 +199,6 @@ def test_effects_that_the_rig_states_come_first_and_are_never_causes(world):
     ]  # fmt: skip
 
 
-def test_a_time_within_the_clocks_error_goes_though_it_is_needed(world, monkeypatch):
-    """A lag of 25 us came in as one of a pair, of which only the newest was looked at."""
-    monkeypatch.setattr(elimination, "is_within_clocks", lambda solution, name: name == LAG)
-    left = world(script({"": 9.0, GAP: 3.0, LAG: 4.0, f"{GAP}+{LAG}": 1.0})).eliminate(GAP, LAG)
-    assert left.last.causes == (GAP,)
-    assert reasons(left) == [(LAG, "at_bound", "")]
-
-
 @pytest.mark.parametrize(
     ("cause", "rival", "typical"),
     [(STRIBECK, FRICTION, {"torque"}), (STOP, CUBIC, None)],  # N m for N m; 1/rad^2 for rad

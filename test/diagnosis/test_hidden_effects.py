@@ -21,13 +21,13 @@ from rsea_ros.records.record import Channel, Record
 from rsea_ros.report.remark_words import remark_sentences
 
 pytestmark = pytest.mark.usefixtures("brief_next_run")
-SWEEP = {"duration": 10.0, "noise": 0.0, "low": 0.2, "high": 30.0}
+SWEEP = {"duration": 6.0, "noise": 0.0, "low": 0.2, "high": 30.0}
 
 
-def slow_sweep():
-    """Return a sine of 30 N m from 0.1 to 10 Hz in 20 s."""
-    t = np.arange(round(20.0 * RATE)) / RATE
-    growth = np.log(100.0) / 20.0
+def slow_sweep(seconds=10.0):
+    """Return a sine of 30 N m from 0.1 to 10 Hz."""
+    t = np.arange(round(seconds * RATE)) / RATE
+    growth = np.log(100.0) / seconds
     return 30.0 * np.sin(2.0 * np.pi * 0.1 * np.expm1(growth * t) / growth)
 
 
@@ -96,7 +96,7 @@ def test_strong_cogging_is_named_with_its_size():
     """A free simulation left 120 times the noise: a 502:1 gear settles in other detents than the real one."""
     amplitude, cycles, rng = 4.0, 8.0, np.random.default_rng(2)
     ripple = {"amplitude": amplitude, "cycles_per_revolution": cycles, "phase": float(rng.uniform(-3.0, 3.0))}
-    record = record_run(hide(drawn_bench(rng), "torque_ripple", ripple), 2001, "chirp_noise", 5.0)
+    record = record_run(hide(drawn_bench(rng), "torque_ripple", ripple), 2001, "chirp_noise", 4.2)
     diagnosis = diagnose([record], RIG, settings=trying("torque_ripple", "backlash"))
     assert diagnosis.causes[0].name == "torque_ripple"
     sizes = diagnosis.causes[0].parameters
@@ -131,7 +131,7 @@ def test_a_mode_above_the_band_is_told_from_a_base_that_moves():
     parameters = drawn_parameters("structural_resonance", "strong", rng)
     assert parameters["frequency"] > 60.0
     bench = hide(drawn_bench(rng), "structural_resonance", parameters)
-    record = record_command(bench, slow_sweep(), rng)
+    record = record_command(bench, slow_sweep(20.0), rng)
     settings = trying("structural_resonance", "base_compliance")
     (cause,) = diagnose([record], RIG, settings=settings).causes
     assert (cause.name, cause.status) == ("structural_resonance", "confirmed")
@@ -158,7 +158,7 @@ def test_a_poor_first_guess_does_not_lose_the_effect(name, parameters, beside):
 def diagnose_bench(tried, **hidden):
     """Return the diagnosis of a drawn bench with values of its own, by some effects of the catalogue."""
     bench = drawn_bench(np.random.default_rng(3)).with_values(**hidden)
-    return diagnose([record_run(bench, 5, "chirp_noise", 10.0)], RIG, settings=trying(*tried))
+    return diagnose([record_run(bench, 5, "chirp_noise", 6.0)], RIG, settings=trying(*tried))
 
 
 def test_a_right_cause_is_named_beside_a_law_that_the_catalogue_lacks():
@@ -208,7 +208,7 @@ def test_friction_that_lets_a_gear_rest_is_confirmed_and_no_larger_law_doubts_it
 def test_a_lag_beside_the_clocks_is_no_delay():
     """In a logarithm a lag has a plateau at nothing: from the clock's bound the fit went there and stayed."""
     late = RIG.with_effect("ft_sensor_lag", time_constant=1.5e-3)
-    record = excited(late, "chirp", sensors=3, duration=15.0, amplitude=40.0, noise=20.0)
+    record = excited(late, "chirp", sensors=3, duration=8.0, amplitude=40.0, noise=20.0)
     (cause,) = diagnose([record], RIG, settings=trying("ft_sensor_lag", "ft_delay", "base_compliance")).causes
     low, high = cause.parameters["time_constant"].ci95
     assert cause.name == "ft_sensor_lag" and low < 1.5e-3 < high

@@ -20,8 +20,8 @@ SETTINGS = trying(*TRIED, max_causes=2)
 
 
 def log_joint(rig):
-    """Return 6 s of a joint whose inertia, damping and gravity are not those of its rig."""
-    targets = excitation("chirp", replace(JOINT, duration=6.0, high=3.0))
+    """Return 5 s of a joint whose inertia, damping and gravity are not those of its rig."""
+    targets = excitation("chirp", replace(JOINT, duration=5.0, high=3.0))
     off = {"rotor.reflected_inertia": 0.026, "rotor.reflected_damping": 0.35, "spring_end.gravity": 0.6}
     return simulate(rig.with_values(off), targets, JOINT.rate, seed=6)
 
@@ -39,11 +39,11 @@ def test_friction_and_a_delay_of_the_targets_are_named():
 
 
 def log_frames(own=None):
-    """Return 6 s of a joint with friction that follows MIT frames at 200 Hz, firmware at 1 kHz, by RK2.
+    """Return 5 or 6 s of a joint with friction that follows MIT frames at 200 Hz, firmware at 1 kHz, by RK2.
 
     own: its motor torque is logged, that of the same frame or of the one before.
     """
-    t = 0.005 * np.arange(1200)
+    t = 0.005 * np.arange(1200 if own is None else 1000)
     w = 2.0 * np.pi * np.array([[0.4], [2.1], [7.0]])
     sizes = np.array([[0.5], [0.2], [0.05]])
     angles, rates = (sizes * np.sin(w * t)).sum(0), (sizes * w * np.cos(w * t)).sum(0)

@@ -62,7 +62,7 @@ def test_a_rig_that_is_wrong_decides_between_no_two_causes():
     """A wrong motor constant and a wrong gain differ by the rig's values alone, and one of these is off."""
     name, value, cause, rival = "spring.stiffness", 1.6, "ft_gain_error", "torque_constant_error"
     truth = RIG.with_values({name: value * RIG[name]}).with_effect(cause, gain=0.88)
-    record = excited(truth, "chirp", sensors=7, duration=12.0, **ASKED)
+    record = excited(truth, "chirp", sensors=7, duration=6.0, **ASKED)
     found = diagnose([record], RIG, settings=trying(cause, rival, "current_loop_lag", "coulomb_friction"))
     (named,) = found.causes
     assert named.status == "one_of"
@@ -76,7 +76,7 @@ def test_what_came_later_does_not_decide_between_two_causes_either():
     hardly tells a torque constant of 0.94 from a gain.
     """
     truth = RIG.with_effect("coulomb_friction", torque=2.0).with_effect("torque_constant_error", gain=0.94)
-    run = only(excited(truth, "chirp", sensors=7, duration=6.0, **ASKED), "position", "ft")
+    run = only(excited(truth, "chirp", sensors=7, duration=4.5, **ASKED), "position", "ft")
     record = run.with_channels(ft=Channel(run["ft"].t + 6e-3, run["ft"].y))
     tried = ("torque_constant_error", "ft_gain_error", "ft_delay", "ft_sensor_lag", "coulomb_friction")
     found = diagnose([record], RIG, settings=trying(*tried))
@@ -93,7 +93,7 @@ SEA = load_rig("sea_two_encoders")
 INERTIA = "rotor.reflected_inertia"
 
 
-def torque_chirp_of(values, effects, seed=3, seconds=7.0):
+def torque_chirp_of(values, effects, seed=3, seconds=5.0):
     """Return a record of a locked actuator with a spring encoder, without motor current."""
     rig = SEA.with_values(values)
     for name, parameters in effects.items():

@@ -21,7 +21,7 @@ from rsea_ros.records.record import Channel, Record
 
 TRUE = {"rotor.reflected_inertia": 0.21, "rotor.reflected_damping": 1.9, "spring.stiffness": 310.0,
         "spring.damping": 0.55}  # fmt: skip
-RATE, SECONDS, PARTS = 250.0, 20.0, 4
+RATE, SECONDS, PARTS = 250.0, 12.0, 4
 WALK = np.array([[0.4, 0.35, 0.3], [0.9, 0.15, 2.0], [1.7, 0.08, 4.4], [2.9, 0.03, 1.1], [6.1, 0.006, 5.0]])
 PUSH = np.array([[0.3, 6.0, 0.2], [1.1, 4.0, 1.4], [2.3, 3.0, 2.9], [5.0, 2.0, 4.0], [9.0, 1.5, 5.5]])
 TRIED = ("nonlinear_spring", "coulomb_friction", "ft_gain_error", "torque_constant_error", "command_delay")
@@ -110,7 +110,7 @@ def test_a_sound_joint_has_no_cause_also_where_no_hold_of_the_log_made_its_torqu
 
 
 def test_what_ends_early_counts_no_longer():
-    run, ends = moved(), {"motor_torque": 14.0, "ft": 16.0}
+    run, ends = moved(), {"motor_torque": 8.4, "ft": 9.6}
     ended = {n: np.where(run[n].t < end, run[n].y, np.nan) for n, end in ends.items()}
     cut = run.with_channels(**{n: Channel(run[n].t, y) for n, y in ended.items()})
     assert diagnose([cut], joint(), settings=SETTINGS).verdict == "nothing_wrong"

@@ -22,7 +22,7 @@ FRICTION_ALONE = trying("coulomb_friction", max_causes=1)
 
 
 def record_bench(*effects):
-    return excited(RIG.with_effects(*effects), "multisine", sensors=3, duration=8.0, period=4.0)
+    return excited(RIG.with_effects(*effects), "multisine", sensors=3, duration=5.0, period=2.5)
 
 
 def test_a_known_effect_acts_and_is_no_cause():

@@ -219,7 +219,7 @@ def solve(name: str, p: Mapping[str, float], held: np.ndarray, period: float) ->
         hold = math.floor(((begin + end) / 2 - delay) / period)
         u = held[hold] if hold >= 0 else 0.0
         x = solve_ivp(lambda t, x, u=u: law(t, x, u, p)[0], (begin, end), x, method="LSODA",
-                      rtol=1e-8, atol=1e-11).y[:, -1]  # fmt: skip
+                      rtol=1e-7, atol=1e-10).y[:, -1]  # fmt: skip
         torque, *read = law(end, x, u, p)[1:]
         rows.append((torque, *(read or x[:2])))
     kept = np.array(rows)[np.isin(times[1:], ends)]

@@ -133,7 +133,7 @@ def test_a_gear_goes_along_the_cubic_through_both_ends(t):
     assert _chassis.along.py_func(PATH, t) == pytest.approx(truth, rel=1e-9, abs=1e-15)
 
 
-def played(y, v, half, path, chassis, count=4_000):
+def played(y, v, half, path, chassis, count=1_000):
     """Return the chassis at the end of a step, and its integral, by small steps of its equation."""
     k, b, j = chassis
     dt, area = path.h / count, 0.0

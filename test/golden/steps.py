@@ -37,18 +37,18 @@ PLAY = ("backlash", "hard_stop", "ft_sensor_lag", "coulomb_friction")
 NO_DRAG, NO_PLAY = (" ".join(n for n in catalogue() if n not in tried) for tried in (DRAGS, PLAY))
 
 VERBS: dict[str, tuple[str, ...]] = {
-    "bag": (f"simulate {RIG} --effect coulomb_friction:torque=3 --duration 8 --seed 5 --out bag",),
+    "bag": (f"simulate {RIG} --effect coulomb_friction:torque=3 --duration 6 --seed 5 --out bag",),
     "check": ("check bag", "check bag --json"),
     "identified": ("identify bag --out identified",),
     "diagnosed": ("diagnose bag --out diagnosed",),
     "diagnosis_without_friction": (
-        f"diagnose bag --without {NO_DRAG} --max-causes 1 --json --from 1 --to 7",
+        f"diagnose bag --without {NO_DRAG} --max-causes 1 --json --from 0.5 --to 5.5",
     ),
     "predicted.csv": ("predict diagnosed/model.yaml bag --out predicted.csv",),
-    "law": ("law bag --out law --from 3",),
+    "law": ("law bag --out law --from 1",),
     "run": ("experiment play.yaml drag.yaml --limits torque=40,deflection=0.1 --longest 4 --out run",),
     "designed": ("design --out designed",),
-    "controlled": (f"control {RIG} --rate 100 --out controlled",),
+    "controlled": (f"control {RIG} --rate 75 --out controlled",),
     "paper": ("paper --duration 20 --out paper",),
     "exported": tuple(
         f"export --{kind} diagnosed/model.yaml --out exported{name}"
@@ -79,7 +79,7 @@ VERBS: dict[str, tuple[str, ...]] = {
         "diagnose bag --holdout bag", "diagnose bag --without dance", "diagnose bag --from 5 --to 3",
         "diagnose bag --max-causes none", "diagnose bag --fail-on dance", "identify bag --topic ft=/nowhere",
         "identify bag --axis torqe.z", "identify bag --shift ft=much", "check bag --joint elbow",
-        "check bag --window 3", "predict map.yaml bag", "predict bag", "law bag --from 7.9",
+        "check bag --window 3", "predict map.yaml bag", "predict bag", "law bag --from 5.9",
         f"simulate {RIG} --effect dance:torque=1 --out x", f"simulate {RIG} --effect backlash:gap=-1 --out x",
         f"simulate {RIG} --effect backlash:gap=wide --out x", f"simulate {RIG} --duration 0 --out x",
         f"simulate {RIG} --rate 1e9 --out x", f"simulate {RIG} --low 200 --out x",

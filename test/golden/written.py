@@ -36,6 +36,7 @@ SECRETS = (
     (re.compile(r"\b\d(\.\d+)?e[-−]1\d\b"), "TINY"),
     (re.compile(r"\b\d+\.\d+ s( per| each|,)? elapsed"), "TIME"),
 )
+ALIGNED = re.compile(r"(?<=\S) {2,}")
 SCRIPT = re.compile(r"<script([^>]*)>(.*?)</script>", re.DOTALL)
 STYLE = re.compile(
     r"\.settings:|\.layout.*(font|margin|hoverlabel|standoff)[^:]*:|\.data.*\.(line|marker|font):|: title"
@@ -44,11 +45,15 @@ DRAWING = re.compile(r"<svg.*?</svg>", re.DOTALL)
 
 
 def text_of(path: Path) -> str:
-    """Return the text that stands for a file or for all files of a folder."""
+    """Return the text that stands for a file or for all files of a folder.
+
+    The second bag of a folder and more have their name alone: what was fitted to them is in the results.
+    """
     if path.is_dir() and (path / "metadata.yaml").exists():
         return f"--- {path.name}\n{_bag(path)}"
     if path.is_dir():
-        return "\n".join(text_of(p) for p in sorted(path.iterdir()))
+        more = sorted(path.glob("*.mcap"))[1:]
+        return "\n".join(f"--- {p.name}" if p in more else text_of(p) for p in sorted(path.iterdir()))
     return f"--- {path.name}\n{_content(path)}"
 
 
@@ -175,7 +180,7 @@ def plain(text: str) -> str:
     """Return a text without what differs from run to run, and without blanks that only align."""
     for pattern, word in SECRETS:
         text = pattern.sub(word, text)
-    return "\n".join(re.sub(r"(?<=\S) {2,}", " ", line).rstrip() for line in text.splitlines())
+    return "\n".join(line.rstrip() for line in ALIGNED.sub(" ", text).splitlines())
 
 
 def page(html: str) -> str:

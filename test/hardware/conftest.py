@@ -12,8 +12,9 @@ from rsea_ros.hardware.dynamixel.motor import Motor
 from rsea_ros.hardware.guarded import GuardedDevice
 from rsea_ros.hardware.limits import Limits
 from rsea_ros.hardware.mit_can.motor import CanConnection, MitMotor
-from rsea_ros.hardware.motor_netft import MotorNetft
+from rsea_ros.hardware.motor_netft import CONFIGURE, MotorNetft
 from rsea_ros.hardware.netft.sensor import SensorConnection
+from rsea_ros.hardware.peer.registers import MODELS
 
 PERIOD = 1.0 / 280.0
 STIFFNESS = 1530.456
@@ -21,7 +22,7 @@ LATENCY, FT_TIMEOUT, WATCHDOG = 0.03, 0.2, 0.5
 """s; a machine that is busy with other tests must not look like a fault."""
 
 
-def device_on(bench, limits=None, *, absolute=False, **motor):
+def device_on(bench, limits=None, *, zero=CONFIGURE, **motor):
     """Return the driver's device on a bench; a model that is a name is a drive on a CAN bus."""
     patient, model = {"latency": LATENCY, "watchdog": WATCHDOG, **motor}, getattr(bench, "model", 54024)
     if isinstance(model, str):
@@ -29,7 +30,7 @@ def device_on(bench, limits=None, *, absolute=False, **motor):
     else:
         made = Motor(MotorConnection(bench.port, 4_000_000, **patient))
     sensor = SensorConnection("127.0.0.1", bench.ft_port, bench.page_port, FT_TIMEOUT)
-    return MotorNetft(made, sensor, limits or limits_on(bench), STIFFNESS, absolute=absolute)
+    return MotorNetft(made, sensor, limits or limits_on(bench), STIFFNESS, zero=zero)
 
 
 def limits_on(bench):
@@ -103,7 +104,8 @@ def benches(tmp_path_factory):
             path = tmp_path_factory.mktemp("bench") / f"tty{model}"
             made[model] = Bench(path, "--can" if isinstance(model, str) else "--model", model)
             made[model].model = model
-            made[model].volts = 120 if model in (1020, 1170) else 240
+            known = not isinstance(model, str)
+            made[model].volts = MODELS[model].registers["voltage"].start if known else 240
         return made[model]
 
     yield bench

@@ -135,13 +135,13 @@ def test_learning_over_a_while_is_learning_at_one_go(clean):
 
 def test_a_change_that_no_cause_explains_is_not_looked_at_closer_for_ever():
     """Looks of each second and fits that find nothing would take more of a core than a joint may have."""
-    settings, rng = WatchSettings(learn=5, every=2.0, fitted=3), np.random.default_rng(1)
+    settings, rng = WatchSettings(learn=4, every=2.0, fitted=2), np.random.default_rng(1)
     monitor, looks = Monitor(rig(), noise_of(rig()), settings), [0.0]
 
     def note():
         looks.extend([monitor.now] * (monitor.looks - len(looks) + 1))
 
-    play(monitor, BENCH, 30.0, rng, noted=note)
-    play(monitor, BENCH.with_values(resonance=0.4), 30.0, rng, start=30.0, noted=note)
+    play(monitor, BENCH, 24.0, rng, noted=note)
+    play(monitor, BENCH.with_values(resonance=0.4), 30.0, rng, start=24.0, noted=note)
     assert [f.code for f in monitor.findings()] == ["RSEA_UNEXPLAINED"]
     assert min(np.diff(looks[-4:])) > 1.5

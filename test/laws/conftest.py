@@ -17,6 +17,6 @@ def learn_of():
     @cache
     def learnt(**values):
         bench = drawn_bench(np.random.default_rng(3)).with_values(**values)
-        return learn([record_run(bench, 3, "chirp_noise", 5.0)], RIG)
+        return learn([record_run(bench, 3, "chirp_noise", 4.0)], RIG)
 
     return learnt

@@ -57,7 +57,7 @@ def test_a_stiffness_that_repeats_is_one_law_of_its_period():
     change = Parameter("change", "N m/rad", 0.0, -1e3, 1e3, 300.0)
     claims = Claims("deflection", "neither", None)
     effect = Effect("wavy", Port.SPRING, (change,), claims, wavy_spring, reads=(st.DEFLECTION,))
-    command = chirp_noise(6.0, np.random.default_rng(5))
+    command = chirp_noise(4.0, np.random.default_rng(5))
     with lend(effect):
         record = simulate(RIG.with_effect("wavy", change=300.0), command, RATE, seed=5)
     (written,) = learn([record], RIG).laws
@@ -83,6 +83,6 @@ def test_a_clean_record_yields_nothing(learn_of):
 def test_a_law_that_is_not_surely_better_is_not_written(monkeypatch):
     monkeypatch.setattr(rsea_ros.laws.learn, "gain_of", lambda *_: (0.12, (-0.01, 0.3)))
     bench = drawn_bench(np.random.default_rng(3)).with_values(quadratic_drag=12.0)
-    result = learn([record_run(bench, 3, "chirp_noise", 4.0)], RIG)
+    result = learn([record_run(bench, 3, "chirp_noise", 3.0)], RIG)
     assert result.laws == () and result.gain == 0.0 and result.tried
     assert "no law surely reduces it" in headline(result)

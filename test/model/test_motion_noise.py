@@ -89,7 +89,7 @@ def test_a_bare_drive_of_plain_python_is_at_its_noise_and_its_late_command_a_del
     """Flawless it was 1.9 times its noise, and the delay an overshoot, which undoing had made of it."""
     tried = {"command_delay", "current_loop_lag", "current_loop_overshoot", "encoder_delay"}
     settings = DiagnosisSettings(without=tuple(catalogue().keys() - tried))
-    diagnosis = diagnose([swung(12.0, late)], pendulum_rig(), settings=settings)
+    diagnosis = diagnose([swung(8.0, late)], pendulum_rig(), settings=settings)
     assert tuple(c.name for c in diagnosis.causes) == named
     assert diagnosis.verdict == ("explained" if named else "nothing_wrong")
     for cause in diagnosis.causes:

@@ -1,5 +1,6 @@
 """Known filters of sensors against slow plain ones: lsim on a fine grid, loops without our formulas."""
 
+import functools
 import math
 from dataclasses import replace
 
@@ -81,16 +82,21 @@ def kalman(u, ratio):
 PLAIN = {"average": averaged, "exponential": smoothed, "alpha_beta": tracked, "kalman": kalman}
 
 
+@functools.cache
+def fine(channel):
+    """Return times on a fine grid, and a channel there."""
+    t = np.arange(len(COMMAND) * FINE + 1) / (RATE * FINE)
+    if channel == "motor_torque":
+        return t, np.append(np.repeat(COMMAND.y, FINE), 0.0)
+    asked = Record({"command": COMMAND, channel: Channel(t, np.zeros(len(t)))})
+    return t, simulate(RIG, asked, refine=4)[channel]
+
+
 def expected(kind, channel):
     """Return a filtered channel of the bench by other means than the simulation's."""
     if kind in PLAIN:
         return np.array(list(PLAIN[kind](synthesize(RIG, COMMAND, noise=False)[channel].y, *NUMBERS[kind])))
-    t = np.arange(len(COMMAND) * FINE + 1) / (RATE * FINE)
-    if channel == "motor_torque":
-        u = np.append(np.repeat(COMMAND.y, FINE), 0.0)
-    else:
-        asked = Record({"command": COMMAND, channel: Channel(t, np.zeros(len(t)))})
-        u = simulate(RIG, asked, refine=4)[channel]
+    t, u = fine(channel)
     if kind == "one_pole":
         system = [1.0], [NUMBERS[kind][0], 1.0]
     else:

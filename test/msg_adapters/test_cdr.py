@@ -33,7 +33,7 @@ def _stamp(message) -> int:
     return message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
 
 
-@settings(max_examples=40)
+@settings(max_examples=20)
 @given(st.lists(joint_states, min_size=1, max_size=12))
 def test_joint_states_of_any_layout_decode_as_rosbags_does(messages):
     raw = [raw_of(message) for message in messages]

@@ -4,8 +4,10 @@ import re
 
 import numpy as np
 import pytest
+from scipy.signal import detrend
 
 from msg_adapters.tables import guess_map, import_record, load_map
+from msg_adapters.tables.guess import _without_line
 from rsea_ros.errors import ImportMapError
 
 T = np.arange(400) * 0.004
@@ -99,3 +101,9 @@ def test_a_text_that_is_no_table_is_one_line(tmp_path):
     (tmp_path / "run.csv").write_text("hello\nworld\n")
     with pytest.raises(ImportMapError, match="expected a table with two columns"):
         guess_map(tmp_path / "run.csv")
+
+
+@pytest.mark.parametrize("n", [2, 3, 400])
+def test_a_column_without_its_line_is_that_of_scipy_to_the_last_bit(n):
+    y = 7.0 + np.cumsum(np.random.default_rng(n).standard_normal(n))
+    assert np.array_equal(_without_line(y), detrend(y))

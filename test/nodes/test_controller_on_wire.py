@@ -29,9 +29,10 @@ class Wire:
         self.bench, self.listener = bench, listener
         spaces = {"__ns": "/wired"}
         started = {"autostart": True, "resume": True, "baud": 4_000_000}
-        self.driver = start("driver", remaps=spaces, **bench.parameters(), **started)
-        self.controller = start("controller", remaps=spaces)
         self.health = listener.hear(DiagnosticArray, "/diagnostics", COMMAND)
+        self.controller = start("controller", remaps=spaces)
+        listener.until(lambda: self.status("controller"))  # it designs its gains: nothing need run meanwhile
+        self.driver = start("driver", remaps=spaces, **bench.parameters(), **started)
         self.wrenches = listener.hear(WrenchStamped, "/wired/ft", MEASUREMENT)
         self.desired = listener.node.create_publisher(JointState, "/wired/desired_torque", COMMAND)
 

@@ -74,7 +74,7 @@ class Commanded(Driven):
 
 @pytest.fixture(scope="module")
 def wire(tmp_path_factory, start, listener):
-    with Bench(tmp_path_factory.mktemp("defaults") / "tty") as bench:
+    with Bench(tmp_path_factory.mktemp("defaults") / "tty", "--ft-rate", 1000) as bench:
         bench.hurry()
         made = Commanded(bench, listener, "defaults", start)
         yield made

@@ -7,6 +7,7 @@ from functools import partial
 import pytest
 
 from rsea_ros.errors import ParameterError
+from rsea_ros.hardware.dynamixel.control_tables import MotorConnection
 from rsea_ros.hardware.guarded import GuardedDevice
 from rsea_ros.hardware.limits import Rating
 from rsea_ros.hardware.simulated import SECOND, SimulatedDevice
@@ -61,6 +62,15 @@ def test_an_angle_that_counts_from_the_motors_zero_is_not_the_springs():
     assert felt.deflection == math.radians(5.0)
     with pytest.raises(ParameterError, match=r"deflection_limit = 0\.05 cannot be applied"):
         limits(device="dynamixel_netft", position_zero="motor", ft_host="", deflection_limit=0.05)
+
+
+@pytest.mark.parametrize(("zero", "urdf"), [("configure", False), ("motor", False), ("robotis", True)])
+def test_the_zero_of_the_urdfs_is_the_motors_affair(monkeypatch, zero, urdf):
+    made = []
+    monkeypatch.setattr(_devices, "MotorConnection", lambda _, **own: made.append(own) or MotorConnection(""))
+    monkeypatch.setattr(_devices, "MotorNetft", lambda *_, **own: made.append(own))
+    _devices.dynamixel_netft(DEFAULTS | {"device": "dynamixel_netft", "position_zero": zero})
+    assert (made[0]["urdf_zero"], made[1]["zero"]) == (urdf, zero)
 
 
 @pytest.mark.parametrize(

@@ -53,6 +53,7 @@ class ControlTable:
     bus_watchdog, drive_mode, startup: None on a model without. watchdog_firmware: the first with
     the bus watchdog. torque_limit and goal_torque are currents; later series call them so.
     torque_constant: None without a source. no_load_speed: rad/s, at the highest voltage; inf: no source.
+    zero: counts where the maker's ROS 2 packages, and URDFs, have 0 rad.
     """
 
     model: int
@@ -65,6 +66,7 @@ class ControlTable:
     torque_constant: TorqueConstant | None
     watchdog_firmware: int = 0
     no_load_speed: float = math.inf
+    zero: int = 0
 
     def __getattr__(self, name: str) -> Item:
         try:
@@ -124,6 +126,7 @@ def _table(number: int, series: str, items: Mapping[str, Item], body: Mapping[st
         torque_constant=constant,
         watchdog_firmware=body.get("watchdog_firmware", 0),
         no_load_speed=body.get("no_load_rpm", math.inf) * _RPM,
+        zero=body.get("zero", 0),
     )
 
 
@@ -143,7 +146,8 @@ class MotorConnection:
     per A, 0: that of the model's table. latency: allowance for adapter and scheduler beside the time on the
     wire, s; a reading may also use what the write before it has left. watchdog: s without the host after
     which the motor's own watchdog, or the supervisor, takes the torque away. supervisor: socket of one that
-    runs as a service; empty: a child of this process.
+    runs as a service; empty: a child of this process. urdf_zero: angles are 0 where the table says that the
+    maker's URDFs have it, not at the zero of the motor's counts.
     """
 
     path: str
@@ -154,6 +158,7 @@ class MotorConnection:
     latency: float = 1e-3
     watchdog: float = 0.1
     supervisor: str = ""
+    urdf_zero: bool = False
 
 
 def usual_latency(rate: float, replies: int = 2) -> float:

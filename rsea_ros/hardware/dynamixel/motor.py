@@ -167,6 +167,7 @@ class Motor(BusMotor):
         error = error_names(self.bus.get(table.hardware_error)) if self.bus.alert else ""
         trouble, start = "" if error else self._watchlist.look(), table.sample[0]
         counts = self._counts.take(table.position.value(data, start))
+        counts -= table.zero if self._settings.urdf_zero else 0
         current = table.current.value(data, start) * table.ampere
         return MotorSample(
             instant=instant,

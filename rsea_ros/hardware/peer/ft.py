@@ -3,6 +3,7 @@
 import operator
 import random
 import socket
+import struct
 import threading
 from collections import deque
 from dataclasses import dataclass, field
@@ -68,6 +69,7 @@ class Misbehaviour:
         return packet
 
 
+WORDS = struct.Struct(">9I")
 RECORDS = 500_000
 """Records of the log, where somebody watches: a minute at 7 kHz."""
 STOP, STREAM, BUFFERED, RESET_LATCH, SET_BIAS = 0, 2, 3, 0x41, 0x42
@@ -166,9 +168,9 @@ class ForceSensor:
 
     def _send(self, now: int) -> None:
         values = tuple(c - b for c, b in zip(self._counts, self._bias, strict=True))
-        words = (self._rdt, self._ft, self.status, *(v % (1 << 32) for v in values))
+        record = WORDS.pack(self._rdt, self._ft, self.status, *(v % (1 << 32) for v in values))
         try:
-            self.socket.sendto(b"".join(w.to_bytes(4, "big") for w in words), self._client or ("", 0))
+            self.socket.sendto(record, self._client or ("", 0))
         except OSError:
             self.gone += 1
         if self.keep:

@@ -96,6 +96,18 @@ _PRO_A = _COMMON | {
 }
 
 
+_X330 = {
+    "baud": Register(8, 1, EEPROM, 0, 6, 1),
+    "temperature_limit": Register(31, 1, EEPROM, 0, 100, 70),
+}
+"""Of X330 and X335, unlike other X."""
+_X330_M = _X330 | {"min_voltage": Register(34, 2, EEPROM, 31, 70, 35)}
+_XL330 = _X330_M | {
+    "drive_mode": Register(10, 1, EEPROM, 0, 5),
+    "shutdown": Register(63, 1, EEPROM, 0, 63, 53),
+}
+
+
 def _x(current: int, voltage: tuple[int, int, int]) -> dict[str, Register]:
     """Return the table of an X motor: its largest current; lowest, highest and present voltage, 0.1 V."""
     low, high, now = voltage
@@ -123,12 +135,12 @@ def _x(current: int, voltage: tuple[int, int, int]) -> dict[str, Register]:
     }
 
 
-_V12, _V24 = (95, 160, 120), (110, 300, 240)
+_V12, _V24, _V5, _V11 = (95, 160, 120), (110, 300, 240), (31, 70, 50), (55, 140, 111)
 """Lowest, highest and present voltage, 0.1 V."""
 
 
 def _models() -> dict[int, MotorModel]:
-    """Return every motor of the X and P series and the Pro, with the constant that a count is worth."""
+    """Return every motor of the X, MX and P series and the Pro, with the constant that a count is worth."""
     made = {54024: MotorModel(54024, _PRO, 33.0 / 2048.0, 0.00199234 * _RPM, 501_923)}
     for number, turn, constant in (
         (2000, 607_500, 9.143), (2010, 1_003_846, 6.424), (2020, 1_003_846, 6.826), (2100, 526_374, 2.8),
@@ -147,8 +159,18 @@ def _models() -> dict[int, MotorModel]:
         (1170, 2.69e-3, 2047, _V12, 1.939), (1180, 2.69e-3, 2047, _V12, 1.408),
         (1001, 2.69e-3, 648, _V12, 2.6), (1011, 2.69e-3, 648, _V12, 1.9), (1101, 2.69e-3, 2047, _V12, 2.0),
         (1111, 2.69e-3, 2047, _V12, 1.4), (1270, 2.69e-3, 2047, _V12, 2.0), (1280, 2.69e-3, 2047, _V12, 1.4),
+        (1310, 2.69e-3, 1188, _V24, 3.5),
     ):  # fmt: skip
         made[number] = MotorModel(number, _x(current, voltage), unit, 0.229 * _RPM, 4096, constant)
+    for number, current, voltage, constant, other in (
+        (1190, 1750, _V5, 0.1463, _XL330), (1200, 1750, _V5, 0.3537, _XL330), (1210, 910, _V11, 0.95, _X330),
+        (1220, 910, _V11, 1.15, _X330), (1230, 2352, _V5, 0.3333, _X330_M),
+        (1240, 2352, _V5, 0.5167, _X330_M), (1710, 910, _V11, 1.1, _X330),
+    ):  # fmt: skip
+        made[number] = MotorModel(number, _x(current, voltage) | other, 1e-3, 0.229 * _RPM, 4096, constant)
+    for number, current, constant in ((311, 1941, 1.463), (321, 2047, 1.615)):
+        registers = {name: each for name, each in _x(current, _V12).items() if name != "startup"}
+        made[number] = MotorModel(number, registers, 3.36e-3, 0.229 * _RPM, 4096, constant)
     return made
 
 

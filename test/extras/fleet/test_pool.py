@@ -73,5 +73,5 @@ def test_a_lost_worker_is_replaced_and_its_job_comes_back(pool):
 
 def test_a_worker_that_takes_more_memory_than_it_may_is_lost():
     with on_this_machine(1, 300_000_000) as pool:
-        grow = "[b'1' * 600_000_000, __import__('time').sleep(60)]"
+        grow = "[b'1' * 350_000_000, __import__('time').sleep(60)]"
         assert isinstance(outcome(pool, Job(eval, grow)).error, WorkerLost)

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from dataclasses import replace
 from datetime import datetime, timezone
 from pathlib import Path
@@ -23,7 +21,6 @@ from rsea_ros.model.rig_file import load_rig, rig_text
 from rsea_ros.model.simulation import synthesize
 from rsea_ros.records.record import Channel
 
-ROOT = Path(__file__).parents[3]
 RIG = "paper_high_impedance"
 MARCH_NS = 1_772_700_000_000_000_000
 MAP = """
@@ -86,9 +83,9 @@ def test_a_bad_recording_is_a_row_with_its_reason(serial):
 def test_rows_of_workers_are_those_of_this_process(lab, serial, capsys):
     out = lab / "workers"
     arguments = [*run_node_process(lab), "--out", str(out)]
-    command = [sys.executable, "-m", "rsea_ros", *arguments, "--workers", "1"]
-    done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT)
-    assert "2 done, 2 refused" in done.stdout
+    capsys.readouterr()
+    assert main([*arguments, "--workers", "1"]) == 0
+    assert "2 done, 2 refused" in capsys.readouterr().out
     assert rows(out) == rows(serial)
     assert main([*arguments, "--fail-on", "refused"]) == 0
     said = capsys.readouterr()
