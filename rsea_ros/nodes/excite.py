@@ -18,6 +18,7 @@ from rsea_ros.experiment.run_shape import read_run
 from rsea_ros.identification.excitation import KINDS, ExcitationSettings, check_limits, excitation
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.rig_limits import derive
+from rsea_ros.nodes._drive import REST
 from rsea_ros.nodes._health import OK, STEADY, WARN, Health, NodeHealth
 from rsea_ros.nodes._parameters import DERIVED, JOINT, NodeParameter, stated_limits
 from rsea_ros.nodes._player import Player
@@ -120,7 +121,7 @@ class ExciteNode(Program):
         self._bench = BenchStatus(node, values["joint"], float(abs(command).max(initial=0.0)))
         self._player = Player(
             node, command, rate, lead=values["lead"], wanted=self._wanted, joint=values["joint"],
-            ready=self._bench.ready,
+            ready=self._bench.ready, rest=1.2 * REST,
         )  # fmt: skip
         self._health = Health(node, self._report)
         node.create_timer(1.0, self._tell, clock=STEADY)
