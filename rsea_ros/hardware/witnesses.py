@@ -76,7 +76,8 @@ class Witnesses:
     """Takes readings in. words: a lasting contradiction with its numbers, empty without one.
 
     One window follows the torque, over its pauses; another one each rest, at which ft has its zero. A zero
-    that is another one than at the rest before is none: ft has been changed meanwhile.
+    that is another one than at the rest before is none: ft has been changed meanwhile. Until a rest has
+    lasted, the zero is that of the readings since the first one without torque, if need be of the first one.
     """
 
     def __init__(self, spring: Spring, actuator: Actuator, period: float) -> None:
@@ -86,7 +87,7 @@ class Witnesses:
     def restart(self) -> None:
         """Forget everything, also where ft is zero."""
         self._before: State | None = None
-        self._zero, self._known, self._idle = math.nan, math.nan, 0
+        self._zero, self._known, self._idle = math.nan, math.nan, math.inf
         self._begin()
 
     def _begin(self) -> None:
@@ -110,14 +111,18 @@ class Witnesses:
             self._begin()
         self._low = signals if self._low is None else _nearer(self._low, signals, self._period / SMOOTH)
         if self._idle * self._period <= PAUSE:
-            self._rest, self._known = Window(), self._zero
+            if math.isnan(self._zero):
+                self._zero = self._low.ft - self._low.spring
+            if self._rest.readings * self._period >= LASTING:
+                self._known = self._zero
+            self._rest = Window()
             self._work = self._followed(self._work, self._low)
             if self._work.readings * self._period >= LASTING:
                 self._judge(self._work)
             live = (before.position, before.motor_torque) != (state.position, state.motor_torque)
             return self._gravely(self._low, signals) if live else None  # else they are one witness, no two
         self._rest = self._followed(self._rest, self._low)
-        if self._rest.readings * self._period >= LASTING:
+        if math.isnan(self._known) or self._rest.readings * self._period >= LASTING:
             zero = self._rest.mean.ft - self._rest.mean.spring
             self._zero = self._known if abs(zero - self._known) > self._rig.play else zero
         return None
