@@ -10,6 +10,8 @@ together contradict gravely is a fault at once (decision 314).
 """
 
 import math
+from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -23,6 +25,9 @@ PAUSE, LASTING = 0.1, 0.5
 """s without torque that are a rest; s that a window has at least, and for which a contradiction lasts."""
 UNEVEN = 0.5
 """Part of a deviation that a law which is not the same either way may make a mean of."""
+QUICK, LITTLE = 0.004, 0.25
+"""s: low-pass for an ft that goes against the spring, or with it by at most this part: no gain of a sound
+bench does. Delays are held by a hull of the last readings, not by the low-pass."""
 GRAVE, CYCLES, SIDED = 2.5, 2, 0.5
 """Times its doubts by which the spring contradicts ft gravely; readings running that are a fault; part of
 that by which the motor may be off the spring that it sides with."""
@@ -94,6 +99,8 @@ class Witnesses:
         """Begin anew."""
         self.words, self._off, self._grave = "", 0, 0
         self._low: Signals | None = None
+        self._quick: Signals | None = None
+        self._lately: deque[Signals] = deque(maxlen=1 + math.ceil(self._rig.late / self._period))
         self._noise = self._apart = 0.0
         self._rest, self._work = Window(), Window()
 
@@ -109,7 +116,9 @@ class Witnesses:
             return None
         if self._low is None or math.isnan(signals.spring) != math.isnan(self._low.spring):
             self._begin()
-        self._low = signals if self._low is None else _nearer(self._low, signals, self._period / SMOOTH)
+        self._low = _nearer(self._low or signals, signals, self._period / SMOOTH)
+        self._quick = _nearer(self._quick or signals, signals, self._period / QUICK)
+        self._lately.append(self._quick)
         if self._idle * self._period <= PAUSE:
             if math.isnan(self._zero):
                 self._zero = self._low.ft - self._low.spring
@@ -158,10 +167,28 @@ class Witnesses:
         off, least = abs(low.ft - bend), min(abs(low.ft), abs(bend)) if low.ft * bend > 0.0 else 0.0
         most = GRAVE * max(self._rig.bent * least, self._rig.play)
         sided = abs(bend - low.motor) + hasty < SIDED * off
-        self._grave = self._grave + 1 if sided and off - late - self._noise > most else 0
+        if not (sided and off - late - self._noise > most):
+            low, off, most = self._lately[-1], self._opposed(low), GRAVE * self._rig.play
+            self._grave = self._grave if off - self._noise > most else -1
+        self._grave += 1
         if self._grave < CYCLES:
             return None
         return DeviceFault("ft", off, most, "N m", f"off: {self._told(low)}")
+
+    def _opposed(self, low: Signals) -> float:
+        """Return by how much ft goes against the spring and the motor sides with that, N m; else 0.
+
+        One that is late is among the last torques of the other, so each is held against all of them. An ft
+        that has another zero changes as the spring does.
+        """
+        now, zero = self._lately[-1], self._zero
+        bend = _nearest(now.ft, [x.spring + zero for x in self._lately])
+        felt = _nearest(now.spring + zero, [x.ft for x in self._lately])
+        off, made = bend - now.ft, _nearest(now.ft, [x.motor for x in self._lately]) - now.ft
+        rise, bent = now.ft - low.ft, now.spring - low.spring
+        against = now.ft * bend <= LITTLE * bend**2 and rise * bent <= LITTLE * bent**2
+        sided = made * off >= SIDED * off**2
+        return min(abs(off), abs(now.spring + zero - felt)) if against and sided else 0.0
 
     def _followed(self, window: Window, low: Signals) -> Window:
         part = min(max(1.0 / (window.readings + 1), self._period / MEMORY), 1.0)
@@ -212,3 +239,8 @@ class Witnesses:
 def _nearer(signals: Signals, to: Signals, part: float) -> Signals:
     """Return signals that have gone a part of the way, all of it at most, to others."""
     return Signals(*(x + min(part, 1.0) * (y - x) for x, y in zip(signals, to, strict=True)))
+
+
+def _nearest(x: float, several: Sequence[float]) -> float:
+    """Return what is nearest to x between the least and the largest of several."""
+    return min(max(x, min(several)), max(several))

@@ -25,6 +25,7 @@ RIG, FREE = "paper_high_impedance", "paper_moving_output"
 WAVES = {
     "hold": lambda t, dice: 1.0,
     "sine": lambda t, dice: math.sin(2.0 * math.pi * 2.0 * t),
+    "fast": lambda t, dice: math.sin(2.0 * math.pi * 12.0 * t),
     "step": lambda t, dice: 1.0 if t % 2.0 < 1.0 else -1.0,
     "noise": lambda t, dice: np.clip(0.4 * dice.standard_normal(), -1.0, 1.0),
     "pulses": lambda t, dice: 1.0 if t % 0.6 < 0.4 else 0.0,
@@ -137,6 +138,38 @@ def test_an_ft_that_fades_is_a_fault_however_short_the_rest_before_torque_was(re
         if fault:
             break
     assert fault.startswith("ft: ") and max(made) < 17.0
+
+
+@pytest.mark.parametrize(
+    ("wave", "lie", "most"),
+    [("rest", -1.0, 2.8), ("rest", -0.5, 3.2), ("sine", 0.0, 7.5), ("sine", -0.5, 6.0), ("sine", -1.0, 5.0)],
+)
+def test_an_ft_whose_sign_or_gain_is_lost_at_zero_torque_is_a_fault_in_the_first_newton_metres(
+    wave, lie, most
+):
+    """There is no step to see, and behind a low-pass of 30 ms the motor made 27 to 40 N·m, on a bus 68."""
+    made, fault = [], ""
+    for _, ft, fault, _ in controlled(wave, 5.0, lambda ft: lie * ft, 1.0):
+        made.append(abs(ft))
+        if fault:
+            break
+    assert fault.startswith("ft: ") and max(made[round(RATE) :]) < most
+
+
+@pytest.mark.parametrize(
+    ("effect", "given", "wave", "torque"),
+    [
+        ("encoder_delay", {"delay": 0.008}, "fast", 68.0), ("backlash", {"gap": 0.01}, "sine", 25.0),
+        ("backlash", {"gap": 0.01}, "fast", 25.0), ("spring_hysteresis", {}, "step", 30.0),
+        ("structural_resonance", {}, "noise", 68.0),
+    ],
+)  # fmt: skip
+def test_a_late_encoder_and_play_that_nobody_states_are_no_lost_sign(effect, given, wave, torque):
+    """Two readings without the changes of both called 4 of 670 sound runs so."""
+    guarded, now, _ = bench(RIG, load_rig(RIG).with_effect(effect, **given))
+    play(guarded, now, "rest", 0.0, 1.0)
+    play(guarded, now, wave, torque, 4.0, until_fault=True)
+    assert guarded.fault is None
 
 
 def test_an_ft_that_fades_after_a_tare_is_a_fault_although_torque_follows_it_at_once(monkeypatch):
