@@ -25,9 +25,9 @@ PAUSE, LASTING = 0.1, 0.5
 """s without torque that are a rest; s that a window has at least, and for which a contradiction lasts."""
 UNEVEN = 0.5
 """Part of a deviation that a law which is not the same either way may make a mean of."""
-QUICK, LITTLE = 0.004, 0.25
-"""s: low-pass for an ft that goes against the spring, or with it by at most this part: no gain of a sound
-bench does. Delays are held by a hull of the last readings, not by the low-pass."""
+LITTLE = 0.25
+"""Of the spring: what an ft that goes with it is at least. No gain of a sound bench is less, so no low-pass
+is needed to tell; delays are held by a hull of the last readings."""
 GRAVE, CYCLES, SIDED = 2.5, 2, 0.5
 """Times its doubts by which the spring contradicts ft gravely; readings running that are a fault; part of
 that by which the motor may be off the spring that it sides with."""
@@ -99,7 +99,6 @@ class Witnesses:
         """Begin anew."""
         self.words, self._off, self._grave = "", 0, 0
         self._low: Signals | None = None
-        self._quick: Signals | None = None
         self._lately: deque[Signals] = deque(maxlen=1 + math.ceil(self._rig.late / self._period))
         self._noise = self._apart = 0.0
         self._rest, self._work = Window(), Window()
@@ -117,8 +116,7 @@ class Witnesses:
         if self._low is None or math.isnan(signals.spring) != math.isnan(self._low.spring):
             self._begin()
         self._low = _nearer(self._low or signals, signals, self._period / SMOOTH)
-        self._quick = _nearer(self._quick or signals, signals, self._period / QUICK)
-        self._lately.append(self._quick)
+        self._lately.append(signals)
         if self._idle * self._period <= PAUSE:
             if math.isnan(self._zero):
                 self._zero = self._low.ft - self._low.spring
@@ -168,20 +166,23 @@ class Witnesses:
         most = GRAVE * max(self._rig.bent * least, self._rig.play)
         sided = abs(bend - low.motor) + hasty < SIDED * off
         if not (sided and off - late - self._noise > most):
-            low, off, most = self._lately[-1], self._opposed(low), GRAVE * self._rig.play
+            most = GRAVE * self._rig.play
+            low, off = self._lately[-1], self._opposed(low, most)
             self._grave = self._grave if off - self._noise > most else -1
         self._grave += 1
         if self._grave < CYCLES:
             return None
         return DeviceFault("ft", off, most, "N m", f"off: {self._told(low)}")
 
-    def _opposed(self, low: Signals) -> float:
+    def _opposed(self, low: Signals, least: float) -> float:
         """Return by how much ft goes against the spring and the motor sides with that, N m; else 0.
 
         One that is late is among the last torques of the other, so each is held against all of them. An ft
-        that has another zero changes as the spring does.
+        that has another zero changes as the spring does. least: what counts, N m.
         """
         now, zero = self._lately[-1], self._zero
+        if abs(now.spring + zero - now.ft) <= least:
+            return 0.0
         bend = _nearest(now.ft, [x.spring + zero for x in self._lately])
         felt = _nearest(now.spring + zero, [x.ft for x in self._lately])
         off, made = bend - now.ft, _nearest(now.ft, [x.motor for x in self._lately]) - now.ft
