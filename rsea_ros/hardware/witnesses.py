@@ -10,6 +10,8 @@ together contradict gravely is a fault at once (decision 314).
 """
 
 import math
+from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -23,6 +25,9 @@ PAUSE, LASTING = 0.1, 0.5
 """s without torque that are a rest; s that a window has at least, and for which a contradiction lasts."""
 UNEVEN = 0.5
 """Part of a deviation that a law which is not the same either way may make a mean of."""
+LITTLE = 0.25
+"""Of the spring: what an ft that goes with it is at least. No gain of a sound bench is less, so no low-pass
+is needed to tell; delays are held by a hull of the last readings."""
 GRAVE, CYCLES, SIDED = 2.5, 2, 0.5
 """Times its doubts by which the spring contradicts ft gravely; readings running that are a fault; part of
 that by which the motor may be off the spring that it sides with."""
@@ -76,7 +81,8 @@ class Witnesses:
     """Takes readings in. words: a lasting contradiction with its numbers, empty without one.
 
     One window follows the torque, over its pauses; another one each rest, at which ft has its zero. A zero
-    that is another one than at the rest before is none: ft has been changed meanwhile.
+    that is another one than at the rest before is none: ft has been changed meanwhile. Until a rest has
+    lasted, the zero is that of the readings since the first one without torque, if need be of the first one.
     """
 
     def __init__(self, spring: Spring, actuator: Actuator, period: float) -> None:
@@ -86,13 +92,14 @@ class Witnesses:
     def restart(self) -> None:
         """Forget everything, also where ft is zero."""
         self._before: State | None = None
-        self._zero, self._known, self._idle = math.nan, math.nan, 0
+        self._zero, self._known, self._idle = math.nan, math.nan, math.inf
         self._begin()
 
     def _begin(self) -> None:
         """Begin anew."""
         self.words, self._off, self._grave = "", 0, 0
         self._low: Signals | None = None
+        self._lately: deque[Signals] = deque(maxlen=1 + math.ceil(self._rig.late / self._period))
         self._noise = self._apart = 0.0
         self._rest, self._work = Window(), Window()
 
@@ -108,16 +115,21 @@ class Witnesses:
             return None
         if self._low is None or math.isnan(signals.spring) != math.isnan(self._low.spring):
             self._begin()
-        self._low = signals if self._low is None else _nearer(self._low, signals, self._period / SMOOTH)
+        self._low = _nearer(self._low or signals, signals, self._period / SMOOTH)
+        self._lately.append(signals)
         if self._idle * self._period <= PAUSE:
-            self._rest, self._known = Window(), self._zero
+            if math.isnan(self._zero):
+                self._zero = self._low.ft - self._low.spring
+            if self._rest.readings * self._period >= LASTING:
+                self._known = self._zero
+            self._rest = Window()
             self._work = self._followed(self._work, self._low)
             if self._work.readings * self._period >= LASTING:
                 self._judge(self._work)
             live = (before.position, before.motor_torque) != (state.position, state.motor_torque)
             return self._gravely(self._low, signals) if live else None  # else they are one witness, no two
         self._rest = self._followed(self._rest, self._low)
-        if self._rest.readings * self._period >= LASTING:
+        if math.isnan(self._known) or self._rest.readings * self._period >= LASTING:
             zero = self._rest.mean.ft - self._rest.mean.spring
             self._zero = self._known if abs(zero - self._known) > self._rig.play else zero
         return None
@@ -153,10 +165,31 @@ class Witnesses:
         off, least = abs(low.ft - bend), min(abs(low.ft), abs(bend)) if low.ft * bend > 0.0 else 0.0
         most = GRAVE * max(self._rig.bent * least, self._rig.play)
         sided = abs(bend - low.motor) + hasty < SIDED * off
-        self._grave = self._grave + 1 if sided and off - late - self._noise > most else 0
+        if not (sided and off - late - self._noise > most):
+            most = GRAVE * self._rig.play
+            low, off = self._lately[-1], self._opposed(low, most)
+            self._grave = self._grave if off - self._noise > most else -1
+        self._grave += 1
         if self._grave < CYCLES:
             return None
         return DeviceFault("ft", off, most, "N m", f"off: {self._told(low)}")
+
+    def _opposed(self, low: Signals, least: float) -> float:
+        """Return by how much ft goes against the spring and the motor sides with that, N m; else 0.
+
+        One that is late is among the last torques of the other, so each is held against all of them. An ft
+        that has another zero changes as the spring does. least: what counts, N m.
+        """
+        now, zero = self._lately[-1], self._zero
+        if abs(now.spring + zero - now.ft) <= least:
+            return 0.0
+        bend = _nearest(now.ft, [x.spring + zero for x in self._lately])
+        felt = _nearest(now.spring + zero, [x.ft for x in self._lately])
+        off, made = bend - now.ft, _nearest(now.ft, [x.motor for x in self._lately]) - now.ft
+        rise, bent = now.ft - low.ft, now.spring - low.spring
+        against = now.ft * bend <= LITTLE * bend**2 and rise * bent <= LITTLE * bent**2
+        sided = made * off >= SIDED * off**2
+        return min(abs(off), abs(now.spring + zero - felt)) if against and sided else 0.0
 
     def _followed(self, window: Window, low: Signals) -> Window:
         part = min(max(1.0 / (window.readings + 1), self._period / MEMORY), 1.0)
@@ -209,3 +242,8 @@ def _nearer(signals: Signals, to: Signals, part: float) -> Signals:
     """Return signals that have gone a part of the way, all of it at most, to others."""
     share = min(part, 1.0)
     return Signals._make([x + share * (y - x) for x, y in zip(signals, to, strict=True)])
+
+
+def _nearest(x: float, several: Sequence[float]) -> float:
+    """Return what is nearest to x between the least and the largest of several."""
+    return min(max(x, min(several)), max(several))
