@@ -16,7 +16,7 @@ from rsea_ros.diagnosis.evaluation import Evaluated, Examined, Selection, evalua
 from rsea_ros.diagnosis.naming.conclusion import conclude
 from rsea_ros.diagnosis.result import Diagnosis
 from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings
-from rsea_ros.diagnosis.stepwise import select_stepwise
+from rsea_ros.diagnosis.stepwise import go_on, select_stepwise
 from rsea_ros.diagnosis.stretches import in_stretches, stretches_of
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.effects.effect import Effect
@@ -123,11 +123,30 @@ def search(
     start = joint_start(record, rig) if is_plain else None
     selection = select_stepwise(nominal, effects, pools, tell, settings, start)
     tell("looking for a simpler model", 0.9)
-    selection = eliminate_backwards(selection, effects, pools, settings)
+    selection = settled(selection, effects, pools, tell, settings)
     tell("evaluating on the test blocks", 0.95)
     held_out = held_out_data(selection, holdout)
     stages = pools.fits.map(lambda m: evaluate(selection, m, held_out, pools, settings), selection.models)
     return selection, list(stages)
+
+
+def settled(
+    selection: Selection, effects: Sequence[Effect], pools: Pools, tell: Progress, settings: DiagnosisSettings
+) -> Selection:  # fmt: skip
+    """Return a selection to which no cause can be added, and from which none can be taken.
+
+    A cause that came in for several may make room for what they hid, so the search goes on from what is left.
+    """
+    seen = set[frozenset[str]]()
+    while True:
+        left = eliminate_backwards(selection, effects, pools, settings)
+        causes = frozenset(left.last.causes)
+        if causes == frozenset(selection.last.causes) or causes in seen:
+            return left
+        seen.add(causes)
+        selection = go_on(left, effects, pools, tell, settings)
+        if selection.last.causes == left.last.causes:
+            return selection
 
 
 def searched_effects(nominal: Problem, without: Collection[str]) -> list[Effect]:

@@ -202,19 +202,26 @@ def select_stepwise(
 
     start: a rig whose values the first fit begins with.
     """
-    setup = FitSetup(nominal.cases, settings, pools.run)
-    models = [_fit_nominal(nominal, setup, start)]
-    trials: list[Trial] = []
-    for number in range(settings.max_causes):
+    fitted = _fit_nominal(nominal, FitSetup(nominal.cases, settings, pools.run), start)
+    return go_on(Selection((fitted,)), effects, pools, tell, settings)
+
+
+def go_on(
+    selection: Selection, effects: Sequence[Effect], pools: Pools, tell: Progress, settings: DiagnosisSettings
+) -> Selection:  # fmt: skip
+    """Return a selection with further causes, up to max_causes; itself but for trials where none helps."""
+    models, trials = list(selection.models), list(selection.trials)
+    setup = FitSetup(models[0].cases, settings, pools.run)
+    while len(models[-1].causes) < settings.max_causes and not _is_finished(models[-1]):
         current = models[-1]
-        if _is_finished(current):
-            break
-        step = ForwardStep(current, effects, number, pools, tell, settings).run()
+        step = ForwardStep(current, effects, len(current.causes), pools, tell, settings).run()
         trials += step.trials
         if step.accepted is None:
             break
         trials.append(trial_of(step.accepted, step.accepted.newest, current, "replaced"))
         models.append(on_fine_steps(refit(with_noise_reestimated(step.accepted), setup), setup))
+    if len(models) == len(selection.models):
+        return replace(selection, trials=tuple(trials))
     cases = models[-1].cases
     return Selection((*(rescore(m, cases) for m in models[:-1]), models[-1]), tuple(trials))
 

@@ -8,7 +8,7 @@ import pytest
 import scripted
 from scripted import POOLS, script, settings
 
-from rsea_ros.diagnosis import stepwise
+from rsea_ros.diagnosis import diagnose as diagnosing, stepwise
 from rsea_ros.diagnosis.evaluation import trial_of
 from rsea_ros.diagnosis.settings import DEFAULT
 from rsea_ros.diagnosis.stepwise import StepResult, select_stepwise
@@ -60,7 +60,7 @@ class World:
             monkeypatch.setattr(stepwise, name, stand_in)
 
     def refit(self, model, setup):
-        assert setup.cases == self.nominal.cases and setup.iterations == 12
+        assert setup.cases in (self.nominal.cases, self.fits.cases) and setup.iterations == 12
         self.events.append(("refit", model.causes))
         return model
 
@@ -138,3 +138,23 @@ def test_every_model_is_fitted_again_in_its_noise_and_all_are_scored_in_that_of_
     each = [(what, c) for c in ((), (FRICTION,), (FRICTION, GAP)) for what in ("noise", "refit")]
     assert search.events == [*each, ("scored", ()), ("scored", (FRICTION,))]
     assert [m.outputs for m in selection.models] == [[{"scored": True}]] * 2 + [[{}]]
+
+
+@pytest.mark.parametrize(
+    ("left", "gone_on", "end"),
+    [
+        ({"ab": "ab"}, {}, "ab"),  # nothing to take away
+        ({"ab": "b"}, {"b": "b"}, "b"),  # and nothing helps instead
+        ({"ab": "b", "bcd": "cd"}, {"b": "bcd", "cd": "cd"}, "cd"),  # a cause that came in for two made room
+        ({"ab": "b", "bc": "bc"}, {"b": "bc"}, "bc"),
+        ({"ab": "b", "ba": "b"}, {"b": "ba"}, "b"),  # for ever in a circle
+    ],
+)
+def test_a_search_goes_on_from_what_is_left_until_no_cause_comes_or_goes(monkeypatch, left, gone_on, end):
+    """Gear loss came in for a wrong constant, a soft base and friction, went, and nothing followed it."""
+    selection = lambda names: SimpleNamespace(last=SimpleNamespace(causes=tuple(names)))  # noqa: E731
+    taken = lambda steps: lambda given, *_: selection(steps["".join(given.last.causes)])  # noqa: E731
+    monkeypatch.setattr(diagnosing, "eliminate_backwards", taken(left))
+    monkeypatch.setattr(diagnosing, "go_on", taken(gone_on))
+    found = diagnosing.settled(selection("ab"), (), POOLS, None, DEFAULT)
+    assert "".join(found.last.causes) == end
