@@ -188,6 +188,7 @@ class DrivenJoint:
         report, self._double = self.topics.report(self._cycle, lost), self.topics.namesakes.look()
         values = {
             "active": self.guarded.enabled,
+            "zero_first": self.drive is not None and self.drive.zero_first,
             "fault": fault or "none",
             "dead_host_protection": self.guarded.device.protection,
             "ft_source": self.guarded.ft_source,

@@ -16,6 +16,7 @@ from msg_adapters import ros
 from rsea_ros.errors import DeviceError, RseaError
 from rsea_ros.experiment.joint_weighing import SHORTEST
 from rsea_ros.nodes._cycle import SECOND, Cycle, on_grid
+from rsea_ros.nodes._drive import REST
 from rsea_ros.nodes._qos import COMMAND, DISCOVERY_TIME, MEASUREMENT, await_arrival
 from rsea_ros.nodes._tap import Ears
 from rsea_ros.records.record import FloatArray, Record
@@ -30,8 +31,8 @@ SOFT = 0.1
 class Player:
     """Publishes one command (N m, at `rate` Hz), each value `lead` s before it takes effect.
 
-    wanted: subscriptions of torque_command to wait for. ready: whether it may begin, beside that. rest: s
-    after a first zero, by which a driver with autostart knows that nobody was under way.
+    wanted: subscriptions of torque_command to wait for. ready: whether it may begin, beside that.
+    zero_first: whether a driver with autostart wants to see that nobody was under way.
     publisher: of a node that plays more than once.
     next: values that are out. left_out: values that came too late.
     """
@@ -46,13 +47,13 @@ class Player:
         wanted: int,
         joint: str,
         ready: Callable[[], bool] = lambda: True,
-        rest: float = 0.0,
+        zero_first: Callable[[], bool] = lambda: False,
         publisher: Publisher[ros.JointState] | None = None,
     ) -> None:
         self.command, self.rate = command, rate
         self.next, self.left_out, self.started = 0, 0, False
         self._node, self._lead, self._wanted, self._joint = node, round(lead * SECOND), wanted, joint
-        self._stamp, self._last, self._ready, self._rest, self._zero = 0, 0.0, ready, rest, 0.0
+        self._stamp, self._last, self._ready, self._zero_first, self._zero = 0, 0.0, ready, zero_first, 0.0
         self._stopped_at = -1
         self._publisher = publisher or node.create_publisher(ros.JointState, "torque_command", COMMAND)
         states = ros.JointState, "joint_states", self._begin, MEASUREMENT
@@ -101,10 +102,10 @@ class Player:
         """Start at a whole number of periods after a measurement, once all subscribers listen."""
         if self.started or self.stopped or self.subscriptions < self._wanted or not self._ready():
             return
-        if self._rest and not self._zero:
+        if self._zero_first() and not self._zero:
             self._zero = time.monotonic()
             self._publisher.publish(ros.torque_command_message(time.time_ns(), 0.0, self._joint))
-        if time.monotonic() < self._zero + self._rest:
+        if self._zero and time.monotonic() < self._zero + 1.2 * REST:
             return
         self.started = True
         earliest = time.time_ns() + self._lead + DISCOVERY_TIME

@@ -18,7 +18,6 @@ from rsea_ros.experiment.run_shape import read_run
 from rsea_ros.identification.excitation import KINDS, ExcitationSettings, check_limits, excitation
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.rig_limits import derive
-from rsea_ros.nodes._drive import REST
 from rsea_ros.nodes._health import OK, STEADY, WARN, Health, NodeHealth
 from rsea_ros.nodes._parameters import DERIVED, JOINT, NodeParameter, stated_limits
 from rsea_ros.nodes._player import Player
@@ -33,13 +32,14 @@ PATIENCE = 1.5
 class BenchStatus:
     """The status of the node that publishes joint_states, of one of its joints where it has several.
 
-    idle: why commands would have no effect now though nothing is wrong, or nothing. largest: N m, of the
-    commands; a driver that limits them below that is a fault of the run.
+    idle: why commands would have no effect now though nothing is wrong, or nothing. zero_first: whether a
+    rest must come before torque. largest: N m, of the commands; a driver that limits them below that is a
+    fault of the run.
     """
 
     def __init__(self, node: Node, joint: str, largest: float) -> None:
         self._node, self._joint, self._largest = node, joint, largest
-        self._heard, self._measured, self._fault, self.idle = False, 0.0, "", ""
+        self._heard, self._measured, self._fault, self.idle, self.zero_first = False, 0.0, "", "", False
         self._states = node.create_subscription(JointState, "joint_states", self._on_state, MEASUREMENT)
         node.create_subscription(DiagnosticArray, "/diagnostics", self._on_health, COMMAND)
 
@@ -70,7 +70,7 @@ class BenchStatus:
         """Keep a status. bench: the node."""
         values = {pair.key: pair.value for pair in status.values}
         fault, active = values.get("fault", "none"), values.get("active", "True") == "True"
-        self._heard, self._fault = True, ""
+        self._heard, self._fault, self.zero_first = True, "", values.get("zero_first") == "True"
         if fault != "none":
             self._fault = f"{status.name} has latched a fault, {fault}; rsea call {bench} clear_fault"
         elif self._largest > (limit := float(values.get("torque_limit", math.inf))):
@@ -121,7 +121,7 @@ class ExciteNode(Program):
         self._bench = BenchStatus(node, values["joint"], float(abs(command).max(initial=0.0)))
         self._player = Player(
             node, command, rate, lead=values["lead"], wanted=self._wanted, joint=values["joint"],
-            ready=self._bench.ready, rest=1.2 * REST,
+            ready=self._bench.ready, zero_first=lambda: self._bench.zero_first,
         )  # fmt: skip
         self._health = Health(node, self._report)
         node.create_timer(1.0, self._tell, clock=STEADY)

@@ -169,7 +169,7 @@ def made():
         calls.append("deaf")
         yield
 
-    joint.drive = SimpleNamespace(deaf=deaf, stop=lambda: calls.append("stop"))
+    joint.drive = SimpleNamespace(deaf=deaf, stop=lambda: calls.append("stop"), zero_first=False)
     joint._cycle = SimpleNamespace(rest=lambda: calls.append("rest"))
     asked = []
     joint.topics = SimpleNamespace(
@@ -183,7 +183,8 @@ def test_the_report_has_device_guard_and_topics(made):
     report = joint.report()
     assert calls == ["rest"] and joint.topics.asked == [{"reads lost": 3, "writes lost": 4}]
     assert report == NodeHealth(OK, "running", {
-        "active": True, "fault": "none", "dead_host_protection": "watchdog", "ft_source": "sensor",
+        "active": True, "zero_first": False, "fault": "none", "dead_host_protection": "watchdog",
+        "ft_source": "sensor",
         "lifted_limits": "none", "limited_commands": 0, "failed_reads": 3, "failed_writes": 4, "late": 1,
         "refused": 2, "limits": joint.guarded.guard.limits, "torque_limit": "8", "motor": "X",
     })  # fmt: skip

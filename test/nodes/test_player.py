@@ -69,6 +69,18 @@ def test_it_begins_a_whole_number_of_periods_after_a_measurement(node):
     assert len(node.gone) == 2
 
 
+def test_a_driver_that_wants_to_see_a_rest_hears_a_zero_and_then_nothing_for_a_second(node, monkeypatch):
+    """`activate:=true excite:=true` ended in `restarted`: the run moved at once."""
+    clock = [100.0]
+    monkeypatch.setattr(_player.time, "monotonic", lambda: clock[0])
+    made = player(node, [1.0], zero_first=lambda: clock[0] < 100.5)  # whose answer is one of a while ago
+    for at, started in ((100.0, False), (100.7, False), (101.1, False), (101.3, True)):
+        clock[0] = at
+        node.heard["joint_states"](JointState())
+        assert made.started is started
+    assert node.out == [(NOW, 0.0, "hip")]
+
+
 @pytest.mark.parametrize("why", ["nobody listens", "not ready", "stopped"])
 def test_it_does_not_begin(node, why):
     made = player(node, [1.0], ready=lambda: why != "not ready")
