@@ -82,6 +82,16 @@ class Process:
         self._process.wait()
 
 
+STARTED: list[Process] = []
+"""The nodes of the module under test."""
+
+
+def told(lines=4):
+    """Return the last lines of each node that runs: one of them may explain what did not come."""
+    running = (node for node in STARTED if node.is_running())
+    return "\n".join("\n".join([f"-- {node.pid}", *node.output[-lines:]]) for node in running)
+
+
 def as_argument(value):
     """Return a value as a parameter on the command line."""
     if isinstance(value, bool):
@@ -94,16 +104,15 @@ def as_argument(value):
 @pytest.fixture(scope="module")
 def start(tmp_path_factory):
     """A function that starts a node; what still runs after the module is killed."""
-    started = []
 
     def begin(name, remaps=(), **parameters):
         log = tmp_path_factory.mktemp(name) / "output.log"
-        started.append(Process(name, log, parameters, dict(remaps)))
-        return started[-1]
+        STARTED.append(Process(name, log, parameters, dict(remaps)))
+        return STARTED[-1]
 
     yield begin
-    for process in started:
-        process.kill()
+    while STARTED:
+        STARTED.pop().kill()
 
 
 class Listener:
@@ -140,7 +149,7 @@ class Listener:
             if result := condition():
                 return result
             now = time.monotonic()
-            assert now < begun + TIMEOUT, "waited in vain"
+            assert now < begun + TIMEOUT, f"waited in vain\n{told()}"
             if now > mended + pause:
                 mended = now
                 mend()
