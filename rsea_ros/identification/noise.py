@@ -106,6 +106,8 @@ def fit_falling(levels: FloatArray, weights: FloatArray) -> FloatArray:
 _TINY = 1e-300
 _LONGEST, _SEGMENTS = 512, 8
 _FEWEST = 64
+_MISSING = 1.5
+"""Periods between two samples: with more, one is missing."""
 _ROUNDING = 1e-9
 """Of a channel's standard deviation: less than this is rounding, not noise."""
 _TOP = (0.62, 0.98)
@@ -162,19 +164,28 @@ def top_of_band(values: FloatArray, seams: Sequence[int] | IntArray = ()) -> tup
     return math.sqrt(float(np.median(power[_top(power)]))), _is_flat(power)
 
 
-def _seamless(spectra: ComplexArray, seams: Sequence[int] | IntArray) -> BoolArray:
-    """Return which of half-overlapping segments have no seam inside; all where each has one."""
+def _seamless(spectra: ComplexArray, seams: Sequence[int] | IntArray, fewest: int = 1) -> BoolArray:
+    """Return which of half-overlapping segments have no seam inside; all where too few have none."""
     half = spectra.shape[1] - 1
     first = half * np.arange(len(spectra))
     whole = np.searchsorted(seams, first, side="right") == np.searchsorted(seams, first + 2 * half)
-    return whole if whole.any() else np.ones(len(spectra), bool)
+    return whole if np.count_nonzero(whole) >= fewest else np.ones(len(spectra), bool)
 
 
 def _unlike(command: Channel, t: FloatArray, y: FloatArray) -> FloatArray:
-    """Return the power of a channel that does not follow the command linearly, by frequency."""
-    period = float(np.median(np.diff(t)))
-    u = unit_spectra(np.nan_to_num(command.held(t - 0.25 * period)), _LONGEST, _SEGMENTS)
-    v = unit_spectra(y, _LONGEST, _SEGMENTS)
+    """Return the power of a channel that does not follow the command linearly, by frequency.
+
+    From segments in which no sample is missing, shorter ones where it takes that.
+    """
+    steps = np.diff(t)
+    period = float(np.median(steps))
+    held = np.nan_to_num(command.held(t - 0.25 * period))
+    seams = 1 + np.flatnonzero(steps > _MISSING * period)
+    for longest in (_LONGEST, _LONGEST // 4, _LONGEST // 16, _LONGEST):
+        u, v = (unit_spectra(values, longest, _SEGMENTS) for values in (held, y))
+        if not (whole := _seamless(v, seams, _SEGMENTS)).all() or not len(seams):
+            break
+    u, v = u[whole], v[whole]
     power = np.mean(np.abs(v) ** 2, axis=0)
     shared = np.abs(np.mean(v * u.conj(), axis=0)) ** 2 / (np.mean(np.abs(u) ** 2, axis=0) + _TINY)
     return np.asarray(np.maximum(power - shared, 0.0) / (1.0 - 1.8 / max(2.0, len(v))))

@@ -164,11 +164,7 @@ def _inverse_case(record: Record, rig: Rig) -> Case:
                 "a rig without a spring is judged by what moves it"
             )
     sensors = {n: rig.sensors.get(n, Sensor()) for n in MEASURED if n in record}
-    whole = max((motion.t[part] for part in motion.parts), key=len)  # a gap's jump would pass for noise
-    heard = replace(record, channels={
-        n: c.between(float(whole[0]), float(whole[-1])) for n, c in record.channels.items()
-    })  # fmt: skip
-    motion = motion.with_noise(rig, {n: noise_floor(heard, n, sensor) for n, sensor in sensors.items()})
+    motion = motion.with_noise(rig, {n: noise_floor(record, n, sensor) for n, sensor in sensors.items()})
     judged = motion.judged
     return with_noise_along(rig, Case(
         drive=motion, t=dict.fromkeys(judged, motion.t), measured=judged, noise={},

@@ -194,6 +194,21 @@ def test_the_step_of_coarse_values_is_found(values, step):
     assert step_of(values) == pytest.approx(step)
 
 
+@pytest.mark.parametrize("missing", ["nothing", "one in a hundred", "some gaps"])
+def test_what_moved_while_samples_were_missing_is_no_noise(missing):
+    size = 2**14
+    t = np.arange(size) / RATE
+    lost = {
+        "nothing": np.zeros(size, bool),
+        "one in a hundred": np.random.default_rng(5).random(size) < 0.01,
+        "some gaps": t % 8.0 > 7.8,
+    }[missing]
+    y = 20.0 * np.sin(2.0 * np.pi * 1.3 * t) + white(size, 0.1, seed=4)
+    whole = record(y)
+    heard = whole.with_channels(ft=Channel(t[~lost], y[~lost]))
+    assert noise_floor(heard, "ft", Sensor()) == pytest.approx(0.1, rel=0.1)
+
+
 def test_a_jump_at_a_seam_is_no_noise():
     y = np.random.default_rng(1).normal(size=4096)
     joined = y + 1000.0 * (np.arange(4096) >= 2100)
