@@ -78,7 +78,7 @@ def test_what_came_later_does_not_decide_between_two_causes_either():
     truth = RIG.with_effect("coulomb_friction", torque=2.0).with_effect("torque_constant_error", gain=0.94)
     run = only(excited(truth, "chirp", sensors=7, duration=4.5, **ASKED), "position", "ft")
     record = run.with_channels(ft=Channel(run["ft"].t + 6e-3, run["ft"].y))
-    tried = ("torque_constant_error", "ft_gain_error", "ft_delay", "ft_sensor_lag", "coulomb_friction")
+    tried = ("torque_constant_error", "ft_gain_error", "ft_delay", "coulomb_friction")
     found = diagnose([record], RIG, settings=trying(*tried))
     status = {c.name: c.status for c in found.causes}
     assert status == {
@@ -100,16 +100,6 @@ def torque_chirp_of(values, effects, seed=3, seconds=5.0):
         rig = rig.with_effect(name, **parameters)
     asked = {"duration": seconds, "amplitude": 5.0, "noise": 0.0, "low": 0.1, "high": 40.0}
     return only(excited(rig, "chirp", sensors=seed, **asked), "ft", "deflection")
-
-
-def test_a_slow_lag_of_the_current_is_named_and_not_what_fits_far_from_the_rig():
-    """It looks like a damping of the rotor: a fit without it leaves the rig, and one from there stays."""
-    truth = {INERTIA: 0.013, "rotor.reflected_damping": 5.0}
-    record = torque_chirp_of(truth, {LAG: {"time_constant": 0.034}})
-    found = diagnose([record], SEA, settings=SETTINGS)
-    assert [(c.name, c.status) for c in found.causes] == [(LAG, "confirmed")]
-    (extended,) = (p for p in found.extended if p.name == INERTIA)
-    assert extended.value == pytest.approx(truth[INERTIA], rel=0.1)
 
 
 def test_two_effects_are_named_where_one_fits_as_well_only_far_from_the_rig():
