@@ -82,6 +82,7 @@ def test_a_clean_record_yields_nothing(learn_of):
 
 def test_a_law_that_is_not_surely_better_is_not_written(monkeypatch):
     monkeypatch.setattr(rsea_ros.laws.learn, "gain_of", lambda *_: (0.12, (-0.01, 0.3)))
+    monkeypatch.setattr(rsea_ros.laws.learn, "refined_laws", lambda base, drafts: base)
     bench = drawn_bench(np.random.default_rng(3)).with_values(quadratic_drag=12.0)
     result = learn([record_run(bench, 3, "chirp_noise", 3.0)], RIG)
     assert result.laws == () and result.gain == 0.0 and result.tried
