@@ -158,7 +158,7 @@ def test_one_of_two_values_may_be_shared_and_those_of_others_stay_as_they_are():
 
 def test_a_cause_acts_only_where_it_was_not_removed():
     """The first record, in which it does not act, shows nothing of where its fit should begin."""
-    settings = trying("coulomb_friction", "asymmetric_friction")
+    settings = trying("coulomb_friction")
     records = [record("repaired", behind_spring(1)), record("worn", behind_spring(2, friction=0.12))]
     rig = with_conditions(SPRUNG, [{"record": "repaired", "without": ["coulomb_friction"]}])
     found = diagnose(records, rig, settings=settings)

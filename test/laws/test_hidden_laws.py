@@ -38,15 +38,6 @@ def test_the_gain_is_measured_on_blocks_that_took_part_in_nothing(learn_of):
     assert result.share > 0.95
 
 
-def test_a_wave_of_the_output_is_a_law_of_position_with_its_period(learn_of):
-    (written,) = learn_of(cogging=1.2, cogging_period=0.004).laws
-    law = written.law
-    assert (law.place, law.regressor) == ("gear", "position, periodic")
-    cycles = 2.0 * math.pi / (0.004 * RATIO)
-    assert law.parts[0].shape == pytest.approx(cycles, rel=2e-3)
-    assert math.hypot(*(p.coefficient for p in law.parts)) == pytest.approx(1.2, rel=0.05)
-
-
 @compiled
 def wavy_spring(s, p, x):
     """Add p[0] d sin(900 d) to the torque of a spring of deflection d, rad."""
