@@ -162,7 +162,8 @@ def test_emps_is_diagnosed_with_coulomb_friction_and_its_asymmetry():
 
 def test_pendulum_is_not_given_a_friction_that_gains_nothing():
     record = import_file("pendulum/ddp.measured.csv.gz", "pendulum")
-    outcome = diagnose([record], load_rig("pendulum"), settings=only({"coulomb_friction", "stribeck_friction"}))
+    settings = only({"coulomb_friction", "stribeck_friction"})
+    outcome = diagnose([record], load_rig("pendulum"), settings=settings)
     assert outcome.verdict in ("unexplained", "partly_explained")
     for cause in outcome.causes:
         assert cause.status == "leading" and cause.gain_holdout_ci95[0] > 0.05
