@@ -34,6 +34,14 @@ def test_half_as_large_again_it_is_found(found, name, times, shown):
     assert [c.name for c in again.causes] == [name] * shown
 
 
+def test_the_size_of_a_mode_is_its_participation_and_its_form_stays():
+    mode = effect_named("structural_resonance")
+    size = size_of(mode)
+    part = size.null + 0.5 * (size.typical - size.null)
+    assert size.name == "participation"
+    assert of_size(mode, size, 0.5) == pytest.approx({**mode.typical, "participation": part})
+
+
 def test_what_a_fit_answers_hardly_shows(found):
     """A motor constant, where only the angle is measured: all other values are doubtful, and answer it."""
     names = ("rotor.reflected_inertia", "rotor.reflected_damping", "spring.stiffness", "spring.damping")
