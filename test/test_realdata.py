@@ -35,7 +35,7 @@ DESIGNS = {
 }
 """Travel between -4 and +4 N m, degrees; whether the current limit stops the motor at 25 N m."""
 BASE = next(iter(DESIGNS))
-FRICTIONS = {"asymmetric_friction", "coulomb_friction", "load_dependent_friction", "stribeck_friction"}
+FRICTIONS = {"asymmetric_friction", "coulomb_friction", "stribeck_friction"}
 
 
 def only(effects: set[str]) -> DiagnosisSettings:
