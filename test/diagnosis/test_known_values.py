@@ -85,6 +85,9 @@ def test_what_came_later_does_not_decide_between_two_causes_either():
         "coulomb_friction": "confirmed", "ft_delay": "confirmed", "torque_constant_error": "one_of"
     }  # fmt: skip
     assert [a.name for a in found.alternatives] == ["ft_gain_error"]
+    (late,) = (c.parameters["delay"] for c in found.causes if c.name == "ft_delay")
+    assert late.ci95[0] < 6e-3 < late.ci95[1]
+    assert late.value == pytest.approx(6e-3, rel=0.05)
 
 
 LAG, DELAY = "current_loop_lag", "command_delay"
