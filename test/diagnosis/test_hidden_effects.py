@@ -9,14 +9,12 @@ import numpy as np
 import pytest
 from independent.bench import drawn_bench, record_command, record_run
 from independent.hidden import hide
-from independent.puzzle import RESONANCE, noisy_resonance
+from independent.puzzle import DELAY, RESONANCE, delayed_record, noisy_resonance
 from independent.severities import drawn_parameters
 from runs import RATE, RIG, excited, trying
 
 from rsea_ros.diagnosis.diagnose import diagnose
-from rsea_ros.diagnosis.score import lost_above
 from rsea_ros.effects.catalogue import effect_named
-from rsea_ros.identification.problem import case_from
 from rsea_ros.model.prediction_errors import predict
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.records.record import Channel, Record
@@ -88,15 +86,21 @@ def test_strong_cogging_is_named_with_its_size():
 
 def test_a_resonance_is_found_in_the_noise_and_what_the_noise_hides_is_said():
     """The paper's own puzzle (section 3.2.2): out of sync at 19 Hz, a bump at 33 Hz."""
-    rig, record = load_rig("paper_moving_output"), noisy_resonance(3, 100.0)
-    assert lost_above(case_from(record, rig), "ft") == pytest.approx(19.0, abs=1.5)
     tried = trying("structural_resonance", "command_delay")  # which turns the phase as much at 19 Hz
-    diagnosis = diagnose([record.between(0.0, 30.0)], rig, settings=tried)
+    diagnosis = diagnose([noisy_resonance(3, 100.0)], load_rig("paper_moving_output"), settings=tried)
     assert [cause.name for cause in diagnosis.causes] == ["structural_resonance"]
     for name in ("frequency", "participation"):
         low, high = diagnosis.causes[0].parameters[name].ci95
         assert low < RESONANCE[name] < high
-    assert any("coherence" in s for s in remark_sentences(diagnosis.remarks))
+    lost = next(s for s in remark_sentences(diagnosis.remarks) if "coherence" in s)
+    assert float(lost.split()[1]) == pytest.approx(19.0, abs=1.5)
+
+
+def test_a_delay_of_one_and_a_half_samples_is_no_resonance():
+    tried = trying("command_delay", "structural_resonance")
+    diagnosis = diagnose([delayed_record(3, 6.0)], load_rig("paper_moving_output"), settings=tried)
+    assert [cause.name for cause in diagnosis.causes] == ["command_delay"]
+    assert diagnosis.causes[0].parameters["delay"].value == pytest.approx(DELAY, rel=0.02)
 
 
 def test_a_mode_above_the_band_is_told_from_a_base_that_moves():

@@ -4,6 +4,8 @@ import numpy as np
 from independent.bench import drawn_bench, record_run
 
 RESONANCE = {"frequency": 33.0, "damping_ratio": 0.03, "participation": 0.6}
+DELAY = 1.5 / 280.0
+"""s: one and a half samples, 37 degrees at 19 Hz."""
 
 
 def noisy_resonance(seed, duration=160.0):
@@ -20,4 +22,10 @@ def noisy_resonance(seed, duration=160.0):
         ft_crosstalk_low=19.0,
         ft_crosstalk_high=140.0,
     )
+    return record_run(bench, seed + 1, "white_noise", duration)
+
+
+def delayed_record(seed, duration=160.0):
+    """Record of a bench whose commands act one and a half samples late, with a good sensor."""
+    bench = drawn_bench(np.random.default_rng(seed), "moving_output").with_values(delay=DELAY)
     return record_run(bench, seed + 1, "white_noise", duration)
