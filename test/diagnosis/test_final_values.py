@@ -21,7 +21,7 @@ def diagnosed():
     chirp = np.sin(2.0 * np.pi * (0.2 * t + 29.8 / (2.0 * SECONDS) * t**2))
     command = 10.0 * chirp + 2.0 * np.random.default_rng(0).standard_normal(len(t))
     true = rig.with_values({"chassis.inertia": 4e-3}).with_effect("backlash", gap=6e-3)
-    settings = trying("backlash", "coulomb_friction")
+    settings = trying("backlash")
     return rsea.diagnose(rsea.simulate(true, command, RATE), rig, settings=settings)
 
 

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 from runs import RATE, RIG, excited, only, trying
 
+from rsea_ros.checks.faults import check
 from rsea_ros.diagnosis.diagnose import diagnose
+from rsea_ros.diagnosis.evaluation import Examined
 from rsea_ros.diagnosis.naming import conclusion as outcome
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.errors import IdentificationError
@@ -40,7 +42,7 @@ def test_a_known_effect_acts_and_is_no_cause():
 def test_a_stated_effect_is_fitted_with_the_rig_and_not_dropped():
     """It was silently removed from the rig and found again as a cause."""
     guess = replace(FRICTION, parameters={**FRICTION.parameters, "torque": 2.0})
-    diagnosis = diagnose([record_bench(FRICTION)], RIG.with_effects(guess), settings=FEW)
+    diagnosis = diagnose([record_bench(FRICTION)], RIG.with_effects(guess), settings=FRICTION_ALONE)
     assert (diagnosis.verdict, diagnosis.causes) == ("nothing_wrong", ())
     fitted = {p.name: p.value for p in diagnosis.baseline}
     assert fitted["coulomb_friction.torque"] == pytest.approx(3.0, rel=0.02)
@@ -54,22 +56,21 @@ def test_a_record_too_short_for_the_blocks_is_refused_by_the_function_itself():
 def test_an_accepted_effect_that_is_no_cause_is_listed_as_rejected(monkeypatch):
     """With the verdict `unexplained` it was neither a cause nor rejected."""
     monkeypatch.setattr(outcome, "naming_of", lambda *_: {})
-    diagnosis = diagnose([record_bench(GAP)], RIG, settings=FEW)
+    diagnosis = diagnose([record_bench(GAP)], RIG, settings=trying("backlash", max_causes=1))
     assert (diagnosis.verdict, diagnosis.causes) == ("unexplained", ())
     dropped = {r.name: r for r in diagnosis.rejected}["backlash"]
     assert dropped.reason == "leaves_too_much" and dropped.gain_holdout > 0.5
 
 
-@pytest.mark.parametrize("name", ["ft", "velocity"])
-def test_a_record_with_one_sensor_is_diagnosed_on_it(name):
+def test_a_record_with_one_sensor_is_diagnosed_on_it():
     """Velocity was missing from the list of main channels."""
-    diagnosis = diagnose([only(record_bench(FRICTION), name)], RIG, settings=FRICTION_ALONE)
-    assert diagnosis.channel == name == diagnosis_json(diagnosis)["channel"]
-    assert [(cause.name, cause.channel) for cause in diagnosis.causes] == [("coulomb_friction", name)]
+    diagnosis = diagnose([only(record_bench(FRICTION), "velocity")], RIG, settings=FRICTION_ALONE)
+    assert diagnosis.channel == "velocity" == diagnosis_json(diagnosis)["channel"]
+    assert [(cause.name, cause.channel) for cause in diagnosis.causes] == [("coulomb_friction", "velocity")]
 
 
 def test_the_rate_is_that_of_the_samples_without_their_copies():
     """Every message was logged twice."""
     once = record_bench().channels
     twice = Record({n: Channel(np.repeat(c.t, 2), np.repeat(c.y, 2)) for n, c in once.items()})
-    assert diagnose([twice], RIG, settings=FRICTION_ALONE).rate == pytest.approx(RATE)
+    assert Examined([twice], [check(twice, RIG)], None, RIG).rate == pytest.approx(RATE)

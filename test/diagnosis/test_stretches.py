@@ -131,7 +131,7 @@ def test_a_cause_that_acts_for_four_seconds_of_a_long_record_is_named_and_sized(
     u = command_of(duration=128.0, seed=3, amplitude=10.0).y.copy()
     u[round(81.0 * RATE) : round(85.0 * RATE)] *= 6.0
     record = simulate(RIG.with_effect("torque_saturation", limit=25.0), u, RATE, seed=3)
-    settings = trying("torque_saturation", "torque_constant_error", stretches=SHORT.stretches)
+    settings = trying("torque_saturation", stretches=SHORT.stretches)
     diagnosis = diagnose([record], RIG, settings=settings)
     assert [c.name for c in diagnosis.causes] == ["torque_saturation"]
     low, high = diagnosis.causes[0].parameters["limit"].ci95

@@ -93,11 +93,10 @@ def rate_of_alarms(h, change, looks, seed):
     return alarms / (looks * EVERY / 3600.0)
 
 
-@pytest.mark.parametrize("change", [np.zeros(2), INNER])
-def test_false_alarms_stay_below_the_stated_rate_even_at_the_edge_of_the_doubt(change):
+def test_false_alarms_stay_below_the_stated_rate_even_at_the_edge_of_the_doubt():
     stated = 20.0
     h = threshold(stated, 4, EVERY)
-    assert rate_of_alarms(h, change, 20_000, seed=1) <= stated
+    assert rate_of_alarms(h, INNER, 20_000, seed=1) <= stated
     assert rate_of_alarms(h, OUTER, 1_000, seed=1) > 5.0 * stated
 
 

@@ -50,34 +50,6 @@ def test_a_sensor_that_stops_is_frozen(name):
     assert codes_of(**{name: with_values(name, freeze)}) == [("RSEA_SENSOR_FROZEN", name)]
 
 
-def test_a_sensor_that_is_silent_is_missing():
-    ft = RECORD["ft"]
-    assert codes_of(ft=Channel(ft.t[:300], ft.y[:300])) == [("RSEA_SENSOR_MISSING", "ft")]
-
-
-def test_a_joint_that_stops_publishing_misses_every_sensor():
-    """Its stamps stand still then, so only the clock of the node shows it; no code said so."""
-    sensors = Sensors(RIG)
-    sensors.hear_nothing(3600.0)
-    assert sensors.missing == {}, "a joint that has not begun yet"
-    t, kind, values = events_of(RECORD)
-    sensors.take(t, kind, values)
-    sensors.hear_nothing(0.5)
-    assert sensors.missing == {}
-    sensors.hear_nothing(1.5)
-    assert set(sensors.missing) == {"position", "motor_torque", "ft"}
-    sensors.take(t + 3.0, kind, values)
-    assert sensors.missing == {}
-
-
-def test_values_that_are_no_numbers_are_counted():
-    def spoilt(y):
-        y[10:13] = np.nan
-        return y
-
-    assert codes_of(ft=with_values("ft", spoilt)) == [("RSEA_BAD_DATA", "3 no numbers")]
-
-
 def test_after_a_clock_was_set_the_watch_restarts_and_reports_it():
     monitor = Monitor(RIG, noise_of(RIG))
     t, kind, values = events_of(RECORD)

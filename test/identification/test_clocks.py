@@ -42,9 +42,8 @@ def test_correct_clocks_are_left_alone_and_their_cost_is_reported():
 
 @pytest.mark.parametrize(
     ("offset", "ppm", "moved"),
-    [(8e-5, 0.0, {"clock.ft"}), (0.0, 90.0, {"clock_rate.ft"}),
-     (1.5e-4, -90.0, {"clock.ft", "clock_rate.ft"})],
-)  # fmt: skip
+    [(8e-5, 0.0, {"clock.ft"}), (1.5e-4, -90.0, {"clock.ft", "clock_rate.ft"})],
+)
 def test_a_wrong_clock_is_fitted_with_its_size(offset, ppm, moved):
     nominal, true = bench("paper_high_impedance", 1)
     result = identify([with_clock(record_bench(true, 1, 20.0), "ft", offset, ppm)], nominal)
@@ -71,17 +70,16 @@ def test_a_clock_rate_is_part_of_the_rig():
 SWEEP = {"kind": "chirp", "sensors": 1, "amplitude": 8.0, "noise": 0.0, "low": 0.2, "high": 60.0}
 
 
-@pytest.mark.parametrize(("channels", "ppm"), [(("ft",), 200.0), (("position", "velocity"), -450.0)])
-def test_a_drift_that_turns_the_phases_is_fitted(channels, ppm):
+def test_a_drift_that_turns_the_phases_is_fitted():
     """6 ms by the end of a chirp left 6 times the noise and the damping 28.4 for 25.4 N m s/rad."""
     true = RIG.with_values({"rotor.reflected_damping": 25.4, "spring.stiffness": 1480.0})
     record = excited(true, duration=30.0, **SWEEP)
-    for n in channels:
-        record = with_clock(record, n, 0.0, ppm)
+    for n in ("position", "velocity"):
+        record = with_clock(record, n, 0.0, -450.0)
     result = identify([record], RIG)
     assert max(result.times_noise.values()) < 1.1
-    for n in channels:
-        assert clocks(result)[f"clock_rate.{n}"].value == pytest.approx(ppm, abs=2.0)
+    for n in ("position", "velocity"):
+        assert clocks(result)[f"clock_rate.{n}"].value == pytest.approx(-450.0, abs=2.0)
     damping = next(p for p in result.parameters if p.name == "rotor.reflected_damping")
     assert damping.value == pytest.approx(25.4, abs=0.1)
 

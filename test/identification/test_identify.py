@@ -16,9 +16,8 @@ SEEDS = range(8)
 
 @pytest.mark.parametrize(
     ("name", "kind", "duration"),
-    [("paper_high_impedance", "white_noise", 6.0), ("paper_moving_output", "white_noise", 6.0),
-     ("bare_drive", "chirp", 12.0)],
-)  # fmt: skip
+    [("paper_moving_output", "white_noise", 6.0), ("bare_drive", "chirp", 12.0)],
+)
 def test_intervals_contain_the_truth_as_often_as_they_say(name, kind, duration):
     errors = {}  # of each parameter in its standard deviations, by seed
     for seed in SEEDS:

@@ -94,7 +94,7 @@ def z_scores(effect, rig, seed):
     """Return (estimate - truth) / sigma of every value, the effect's included, after a fit from the truth."""
     rng = np.random.default_rng(seed)
     parameters, bench = drawn_parameters(effect, "medium", rng), drawn_bench(rng)
-    record = record_run(hide(bench, effect, parameters), seed, duration=16.0)
+    record = record_run(hide(bench, effect, parameters), seed, duration=8.0)
     case, p = case_from(record, rig), bench.plant
     nominal = Problem((case,), rig, unknowns_of(rig, (case,)), MEASURED)
     start = start_vector(nominal.unknowns)

@@ -13,6 +13,7 @@ from rsea_ros.laws.candidates import (
     frequencies,
     periods,
     spline_knots,
+    terms_for,
 )
 
 T = np.arange(40_000) / 280.0
@@ -42,6 +43,17 @@ def test_a_wave_that_multiplies_another_signal_is_found_over_that():
     assert periods(theta, torque, deflection)[0] == pytest.approx(6.0, abs=0.05)
     assert periods(theta, torque)[0] != pytest.approx(6.0, abs=0.05), "as a torque it has others"
     assert periods(theta, torque, 0.0 * deflection) == []
+
+
+def test_waves_are_tried_where_the_torque_repeats_or_the_torque_over_the_deflection():
+    theta, step = travelled(9.0), T[1]
+    letters = {"t": T, "theta": theta, "d": np.cos(2.2 * theta)}
+    acting = {"gear": np.sin(4.0 * theta), "spring": letters["d"] * np.sin(6.0 * theta)}
+    for place, cycles in (("gear", 4.0), ("spring", 6.0)):
+        missing = Of(t=T + 0.5 * step, torque=acting[place])
+        model = Of(variables=Of(letters=letters, step=step), missing=missing, injector=1, places={place})
+        waves = [t.shapes[0] for t in terms_for([model]) if "periodic" in t.regressor]
+        assert waves[:2] == pytest.approx([cycles] * 2, abs=0.05), "a sine and a cosine"
 
 
 def test_the_lines_of_a_residual_lie_between_a_hertz_and_most_of_the_band():

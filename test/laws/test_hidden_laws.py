@@ -38,15 +38,6 @@ def test_the_gain_is_measured_on_blocks_that_took_part_in_nothing(learn_of):
     assert result.share > 0.95
 
 
-def test_a_wave_of_the_output_is_a_law_of_position_with_its_period(learn_of):
-    (written,) = learn_of(cogging=1.2, cogging_period=0.004).laws
-    law = written.law
-    assert (law.place, law.regressor) == ("gear", "position, periodic")
-    cycles = 2.0 * math.pi / (0.004 * RATIO)
-    assert law.parts[0].shape == pytest.approx(cycles, rel=2e-3)
-    assert math.hypot(*(p.coefficient for p in law.parts)) == pytest.approx(1.2, rel=0.05)
-
-
 @compiled
 def wavy_spring(s, p, x):
     """Add p[0] d sin(900 d) to the torque of a spring of deflection d, rad."""
@@ -82,6 +73,7 @@ def test_a_clean_record_yields_nothing(learn_of):
 
 def test_a_law_that_is_not_surely_better_is_not_written(monkeypatch):
     monkeypatch.setattr(rsea_ros.laws.learn, "gain_of", lambda *_: (0.12, (-0.01, 0.3)))
+    monkeypatch.setattr(rsea_ros.laws.learn, "refined_laws", lambda base, drafts: base)
     bench = drawn_bench(np.random.default_rng(3)).with_values(quadratic_drag=12.0)
     result = learn([record_run(bench, 3, "chirp_noise", 3.0)], RIG)
     assert result.laws == () and result.gain == 0.0 and result.tried
