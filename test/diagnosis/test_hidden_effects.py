@@ -115,6 +115,24 @@ def test_a_mode_above_the_band_is_told_from_a_base_that_moves():
     assert (cause.name, cause.status) == ("structural_resonance", "confirmed")
 
 
+@pytest.mark.parametrize(
+    ("name", "parameters", "beside"),
+    [
+        # two linear steps from a typical size left more residual than no effect, and the effect was dropped
+        ("damping_drift", {"relative_change": -0.09}, ()),
+        # the guess that was best after two steps ended in another minimum, and a look-alike won or none
+        ("hard_stop", {"angle": 0.0135, "stiffness": 3900.0},
+         (*effect_named("hard_stop").claims.confusable_with, "command_delay")),
+    ],
+)  # fmt: skip
+def test_a_poor_first_guess_does_not_lose_the_effect(name, parameters, beside):
+    rng = np.random.default_rng(5)
+    record = record_command(hide(drawn_bench(rng), name, parameters), slow_sweep(), rng)
+    diagnosis = diagnose([record], RIG, settings=trying(name, *beside))
+    assert [cause.name for cause in diagnosis.causes] == [name]
+    assert diagnosis.verdict == "explained"
+
+
 def diagnose_bench(tried, **hidden):
     """Return the diagnosis of a drawn bench with values of its own, by some effects of the catalogue."""
     bench = drawn_bench(np.random.default_rng(3)).with_values(**hidden)
@@ -163,3 +181,12 @@ def test_friction_that_lets_a_gear_rest_is_confirmed_and_no_larger_law_doubts_it
     assert [(c.name, c.status) for c in found.causes] == [("coulomb_friction", "confirmed")]
     assert found.alternatives == ()
     assert found.causes[0].parameters["torque"].value == pytest.approx(torque, rel=1e-3)
+
+
+def test_a_lag_beside_the_clocks_is_no_delay():
+    """In a logarithm a lag has a plateau at nothing: from the clock's bound the fit went there and stayed."""
+    late = RIG.with_effect("ft_sensor_lag", time_constant=1.5e-3)
+    record = excited(late, "chirp", sensors=3, duration=8.0, amplitude=40.0, noise=20.0)
+    (cause,) = diagnose([record], RIG, settings=trying("ft_sensor_lag", "ft_delay", "base_compliance")).causes
+    low, high = cause.parameters["time_constant"].ci95
+    assert cause.name == "ft_sensor_lag" and low < 1.5e-3 < high
