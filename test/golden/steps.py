@@ -42,7 +42,9 @@ VERBS: dict[str, tuple[str, ...]] = {
     "diagnosed": ("diagnose bag --out diagnosed",),
     "predicted.csv": ("predict diagnosed/model.yaml bag --out predicted.csv",),
     "law": ("law bag --out law --from 1",),
-    "run": ("experiment play.yaml drag.yaml --limits torque=40,deflection=0.1 --longest 2 --refine 8 --out run",),
+    "run": (
+        "experiment play.yaml drag.yaml --limits torque=40,deflection=0.1 --longest 2 --refine 8 --out run",
+    ),
     "designed": ("design --out designed",),
     "controlled": (f"control {RIG} --rate 75 --out controlled",),
     "paper": ("paper --duration 20 --out paper",),
@@ -80,7 +82,7 @@ VERBS: dict[str, tuple[str, ...]] = {
         f"simulate {RIG} --effect backlash:gap=wide --out x", f"simulate {RIG} --duration 0 --out x",
         f"simulate {RIG} --rate 1e9 --out x", f"simulate {RIG} --low 200 --out x",
         f"simulate {RIG} --out bag",
-        f"experiment {RIG} --limits torque=40", f"experiment {RIG} --limits torque=-1 --bag bag",
+        f"experiment {RIG} --limits torque=-1 --bag bag",
         f"experiment {RIG} --limits torqe=40", "design --torque -5", "design --unit rd85",
         "control bare_drive", "control pd_joint --rate 280",
         f"control {RIG} --rate 3", f"control {RIG} --rate 10000", f"control --free {RIG}",
@@ -91,7 +93,6 @@ VERBS: dict[str, tuple[str, ...]] = {
         "fleet run bag --map map.yaml --out s", "fleet report nowhere", "fleet sql SELECT --store nowhere",
         "benchmark make x --records 0", "benchmark score nowhere nowhere", "paper --duration 1",
         "run nowhere", "launch nowhere", "check bag bag --fail-on amber",
-        "identify bag --fail-on misfit --json",
         *(
             f"simulate {RIG} --out x --effect {senseless}"
             for senseless in (
