@@ -54,9 +54,7 @@ RESULTS = {
     "a misfitting spring rig without motor torque": (
         f"diagnose --without {BUT_PLAY}", {"bench": "misfit", "duration": 4.5}
     ),
-    "a dead F/T sensor": ("identify", {"dead": "ft zero"}),
     "channels without noise": ("identify", {"noise": False, "sensors": "zero"}),
-    "a clock that was set": ("identify", {"stamps": "hour forward"}),
     "a sample of 1e308": ("predict", {"dead": "1e308"}),
     "a sample of 1e308 in position and velocity": (
         "predict", {"dead": "1e308", "channels": ("position", "velocity")}

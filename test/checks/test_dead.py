@@ -44,7 +44,6 @@ def kinds(record):
 RNG = np.random.default_rng(0)
 DEAD = {
     "zero": np.zeros(N),
-    "its own noise": 0.03 * RNG.normal(size=N),
     "a walk": np.cumsum(RNG.normal(size=N)),
     "mains": 0.5 * np.sin(2.0 * np.pi * 50.0 * np.arange(N) / 280.0) + 0.03 * RNG.normal(size=N),
 }

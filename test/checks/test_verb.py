@@ -124,7 +124,8 @@ def test_identify_says_first_what_is_wrong_and_leaves_a_dead_channel_out(bag, go
 
 
 def test_identify_questions_the_rig(bag, tmp_path, capsys):
-    assert main(["identify", bag(), "--rig", "prototype_knee", "--out", str(tmp_path / "out")]) == 0
+    words = ["--rig", "prototype_knee", "--to", "4", "--out", str(tmp_path / "out")]
+    assert main(["identify", bag(), *words]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == "compared with rig prototype_knee:"
     assert "is this the right rig?" in " ".join(" ".join(lines[1:4]).split())

@@ -32,7 +32,7 @@ def test_identify_opens_with_whether_the_model_fits(bag, tmp_path, capsys):
     assert capsys.readouterr().out.startswith("The model fits: ")
     misfitting, effect = tmp_path / "misfitting", ["--effect", "torque_constant_error:gain=1.1"]
     assert main(["simulate", RIG, "--duration", "6", "--seed", "6", *effect, "--out", str(misfitting)]) == 0
-    assert main(["identify", str(misfitting), "--out", str(tmp_path / "bad")]) == 0
+    assert main(["identify", str(misfitting), "--out", str(tmp_path / "bad"), "--fail-on", "misfit"]) == 1
     written = json.loads((tmp_path / "bad" / "identification.json").read_text(encoding="utf-8"))
     assert written["verdict"] == "misfit" and "torque_constant_error" in written["alternatives"]
     low, high = written["parameters"]["spring.stiffness"]["ci95"]

@@ -169,10 +169,10 @@ def test_the_designed_controller_meets_its_limits(designed, monkeypatch):
         assert tracking_error(RIG, LOADS, stiff, designed) < most, load
 
 
-def test_a_bench_that_lags_gets_gentler_gains(designed):
+def test_a_bench_that_lags_has_less_room_for_the_same_gains(designed):
     slow = RIG.with_effect("current_loop_lag", time_constant=2e-3)
-    gentle = design(slow, load_range(slow, FREE), RATE)
-    assert gentle.friction_left > 1.02 * designed.friction_left
+    problem = synthesis._problem(slow, load_range(slow, FREE), RATE, grid(RATE), designed.uncertainty)
+    assert synthesis._design(problem, designed.gains).sensitivity > 1.1 * designed.sensitivity
 
 
 def test_loads_reach_from_locked_to_free():

@@ -83,7 +83,7 @@ def errors(rate, shift, settings=None):
     return math.hypot(real, imaginary) / AMPLITUDE - 1.0, math.atan2(imaginary, real), off_rms
 
 
-@pytest.mark.parametrize(("rate", "shift"), [(RATE, 0.0), (RATE, 0.4), (FAST, 0.0)])
+@pytest.mark.parametrize(("rate", "shift"), [(RATE, 0.4), (FAST, 0.0)])
 def test_a_sine_comes_out_in_size_and_in_time(rate, shift):
     """At 280 Hz it was 4.5 % too large: the current that is read after the write is the new command's, and
     was taken for that of the sample before. A desired torque between two samples came up to 3 degrees off.

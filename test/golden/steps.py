@@ -32,21 +32,19 @@ from rsea_ros.model.rig_file import packaged_names, rig_text
 from rsea_ros.nodes._policies import NODES
 
 RIG = "paper_high_impedance"
-DRAGS = ("quadratic_drag", "load_dependent_friction", "asymmetric_friction", "damping_drift", "torque_ripple")
 PLAY = ("backlash", "hard_stop", "ft_sensor_lag", "coulomb_friction")
-NO_DRAG, NO_PLAY = (" ".join(n for n in catalogue() if n not in tried) for tried in (DRAGS, PLAY))
+NO_PLAY = " ".join(n for n in catalogue() if n not in PLAY)
 
 VERBS: dict[str, tuple[str, ...]] = {
     "bag": (f"simulate {RIG} --effect coulomb_friction:torque=3 --duration 6 --seed 5 --out bag",),
     "check": ("check bag", "check bag --json"),
     "identified": ("identify bag --out identified",),
     "diagnosed": ("diagnose bag --out diagnosed",),
-    "diagnosis_without_friction": (
-        f"diagnose bag --without {NO_DRAG} --max-causes 1 --json --from 0.5 --to 5.5",
-    ),
     "predicted.csv": ("predict diagnosed/model.yaml bag --out predicted.csv",),
     "law": ("law bag --out law --from 1",),
-    "run": ("experiment play.yaml drag.yaml --limits torque=40,deflection=0.1 --longest 4 --out run",),
+    "run": (
+        "experiment play.yaml drag.yaml --limits torque=40,deflection=0.1 --longest 2 --refine 8 --out run",
+    ),
     "designed": ("design --out designed",),
     "controlled": (f"control {RIG} --rate 75 --out controlled",),
     "paper": ("paper --duration 20 --out paper",),
@@ -61,8 +59,8 @@ VERBS: dict[str, tuple[str, ...]] = {
     "effects": tuple(f"effects {name}" for name in catalogue()),
     "rigs": ("rig new mine", *(f"rig check {name}" for name in packaged_names())),
     "imported": ("import spoiled.csv --map map.yaml --out imported",),
-    "spoiled": ("check imported --rig pendulum", "check imported", "identify imported --json"),
-    "spoiled_diagnosis": (f"diagnose imported --json --max-causes 2 --without {NO_PLAY}",),
+    "spoiled": ("check imported --rig pendulum", "check imported"),
+    "spoiled_diagnosis": (f"diagnose imported --json --max-causes 1 --from 0.5 --without {NO_PLAY}",),
     "fleet": (
         "fleet run right left --map joints.yaml --serial --out months",
         "fleet run right left --map joints.yaml --serial --out months",
@@ -84,18 +82,17 @@ VERBS: dict[str, tuple[str, ...]] = {
         f"simulate {RIG} --effect backlash:gap=wide --out x", f"simulate {RIG} --duration 0 --out x",
         f"simulate {RIG} --rate 1e9 --out x", f"simulate {RIG} --low 200 --out x",
         f"simulate {RIG} --out bag",
-        f"experiment {RIG} --limits torque=40", f"experiment {RIG} --limits torque=-1 --bag bag",
+        f"experiment {RIG} --limits torque=-1 --bag bag",
         f"experiment {RIG} --limits torqe=40", "design --torque -5", "design --unit rd85",
         "control bare_drive", "control pd_joint --rate 280",
         f"control {RIG} --rate 3", f"control {RIG} --rate 10000", f"control --free {RIG}",
-        "export --mjcf pd_joint", "export --fmu nowhere",
+        "export --fmu nowhere",
         "effects backlsh", "rig check map.yaml", "rig new a/b", "import map.yaml --map map.yaml --out x",
         "import spoiled.csv --map pendulum --out x", "import spoiled.csv --map nowhere --out x",
         "import nowhere.csv --map map.yaml --out x", "fleet run nowhere --map joints.yaml --out s",
         "fleet run bag --map map.yaml --out s", "fleet report nowhere", "fleet sql SELECT --store nowhere",
         "benchmark make x --records 0", "benchmark score nowhere nowhere", "paper --duration 1",
         "run nowhere", "launch nowhere", "check bag bag --fail-on amber",
-        "identify bag --fail-on misfit --json",
         *(
             f"simulate {RIG} --out x --effect {senseless}"
             for senseless in (
@@ -125,6 +122,7 @@ channels:
 """,
     "joints.yaml": """defaults:
   rig: paper_high_impedance
+  diagnose: never
 joints:
   left: {bags: left}
   right: {bags: right}

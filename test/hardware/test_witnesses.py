@@ -70,16 +70,12 @@ def falsify(device, monkeypatch, gain=1.0, bias=0.0):
 @pytest.mark.parametrize(
     ("wave", "torque", "wrong", "most"),
     [
-        ("hold", 10.0, {"bias": 8.0}, 0.03),
         ("sine", 10.0, {"bias": -8.0}, 0.05),
         ("noise", 27.0, {"bias": 12.0}, 0.2),
         ("hold", 10.0, {"gain": 0.5}, 0.1),
-        ("hold", 5.0, {"gain": 2.0}, 0.05),
-        ("sine", 10.0, {"gain": 0.5}, 0.15),
         ("sine", 10.0, {"gain": -1.0}, 0.15),
         ("step", 10.0, {"gain": 2.0}, 0.1),
         ("pulses", 20.0, {"bias": 30.0}, 0.3),
-        ("pulses", 20.0, {"gain": -1.0}, 0.3),
     ],
 )
 def test_what_spring_and_motor_contradict_gravely_is_a_fault_as_soon_as_it_is_certain(
@@ -116,8 +112,7 @@ def controlled(wave, seconds, falsified, rest=0.7):
         yield time, sample.ft, fault, limits.contradiction
 
 
-@pytest.mark.parametrize("wave", ["hold", "sine", "step"])
-@pytest.mark.parametrize("gain", [0.5, 1.0])
+@pytest.mark.parametrize(("gain", "wave"), [(0.5, "hold"), (0.5, "sine"), (1.0, "step")])
 def test_a_controller_does_not_follow_an_ft_that_reads_half_to_twice_the_torque(gain, wave):
     """It did, without a fault, whatever the driver was."""
     made = []
@@ -128,8 +123,7 @@ def test_a_controller_does_not_follow_an_ft_that_reads_half_to_twice_the_torque(
     assert bool(fault) == (gain == 0.5) and max(made) < 16.0
 
 
-@pytest.mark.parametrize("wave", ["hold", "sine"])
-@pytest.mark.parametrize("rest", [0.02, 0.1, 0.7])
+@pytest.mark.parametrize(("rest", "wave"), [(0.02, "hold"), (0.1, "sine")])
 def test_an_ft_that_fades_is_a_fault_however_short_the_rest_before_torque_was(rest, wave):
     """It had no zero before a rest of 0.6 s: 68 N·m of 10, without a fault."""
     fading, made, fault = (1.0 - k / (2.0 * RATE) for k in range(10_000)), [], ""
@@ -239,9 +233,13 @@ def test_a_zero_that_changes_by_less_is_told_with_the_numbers(monkeypatch, wave,
     assert told.startswith("ft ") and ", motor torque less momentum " in told and "deflection " in told
 
 
-@pytest.mark.parametrize("wave", WAVES)
-@pytest.mark.parametrize("sigmas", [-2.0, 2.0])
-@pytest.mark.parametrize("name", [RIG, FREE])
+@pytest.mark.parametrize(
+    ("name", "sigmas", "wave"),
+    [
+        (RIG, -2.0, "hold"), (RIG, 2.0, "fast"), (RIG, -2.0, "pulses"), (RIG, 2.0, "noise"),
+        (FREE, -2.0, "step"), (FREE, 2.0, "sine"), (FREE, -2.0, "noise"),
+    ],
+)  # fmt: skip
 def test_a_sound_machine_with_values_at_the_ends_of_their_spread_is_told_nothing(name, sigmas, wave):
     """A rule that stops it would be worse than none."""
     rig = load_rig(name)

@@ -19,10 +19,10 @@ from rsea_ros.paper.rival_models import lumped_rig
 
 RATE = 280.0
 SETTLE = 100
-RIGS = ("paper_high_impedance", "paper_moving_output", "prototype_knee")
+RIGS = ("paper_high_impedance", "paper_moving_output")
 CASES = (
-    "nothing", "friction", "friction, stated", "play", "K_s 5 % more", "J_m 10 % less", "b_s half of it",
-    "F/T noise 5 times", "free housing, friction", "samples late",
+    "nothing", "friction, stated", "play", "K_s 5 % more", "F/T noise 5 times", "free housing, friction",
+    "samples late",
 )  # fmt: skip
 """What the model lacks; `python -m bench observer lacks` plays more, longer."""
 

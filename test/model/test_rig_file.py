@@ -37,7 +37,7 @@ def test_everything_that_a_rig_can_hold_survives(tmp_path):
     assert rig_file.load_rig(tmp_path / "model.yaml") == rig
 
 
-@settings(max_examples=30)
+@settings(max_examples=10)
 @given(rigs(gravity=True))
 def test_any_rig_survives_its_document(rig):
     assert rig_file.rig_from_document(yaml.safe_load(yaml.safe_dump(rig_file.rig_to_document(rig)))) == rig

@@ -10,12 +10,10 @@ from random_rigs import RIG_NAMES, rigs
 from scipy.linalg import expm
 from scipy.signal import lsim
 
-from rsea_ros.model import outputs
 from rsea_ros.model.prediction_errors import in_phase, predict
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import Plant, build, run, simulate, synthesize
-from rsea_ros.model.transfer import frequency_response
 from rsea_ros.records.record import Channel, Record
 
 RATE = 1120.0
@@ -52,43 +50,6 @@ def test_a_linear_rig_is_exact(rig, seed):
     for i, name in enumerate(SIGNALS[: len(signals_of(rig))]):
         for expected in (by_lsim[1:, i], np.array(by_expm)[:, i]):
             np.testing.assert_allclose(ours[name], expected, rtol=0, atol=1e-6 * np.abs(expected).max())
-
-
-LINES = np.array([3, 7, 19, 31, 53, 97])
-PERIOD = 2240  # samples: lines are 0.5 Hz apart
-
-
-def multisine(rig, seed):
-    """Return a command of LINES, long enough that the transient has decayed in its last period."""
-    phase = np.random.default_rng(seed).uniform(0, 2 * np.pi, len(LINES))
-    one = np.cos(2 * np.pi * np.outer(np.arange(PERIOD) / PERIOD, LINES) + phase).sum(axis=1)
-    decay = -np.linalg.eigvals(slow.state_matrices(rig)[0]).real
-    slowest = decay[decay > 1e-6].min()
-    return np.tile(one, 2 + int(20.0 / slowest * RATE / PERIOD))
-
-
-def held_response(rig, output, hz):
-    """Return the response of samples to held samples: the aliases of H(f) times the hold's, summed."""
-    k = np.arange(-400, 401)[:, None] * RATE
-    f = (hz + k).ravel()
-    s = 2j * np.pi * f
-    hold = (1 - np.exp(-s / RATE)) / (s / RATE)
-    return (frequency_response(rig, output, f) * hold).reshape(len(k), -1).sum(axis=0)
-
-
-@settings(max_examples=20)
-@given(rigs(), st.integers(0, 1000))
-def test_simulated_record_has_the_frequency_response_of_the_equations(rig, seed):
-    command = multisine(rig, seed)
-    measured = simulate(rig, uniform(command))
-    hz = LINES * RATE / PERIOD
-    late = np.exp(2j * np.pi * hz / RATE)  # the measurement is at the end of the hold
-    asked = np.fft.rfft(command[-PERIOD:])[LINES]
-    for name in set(signals_of(rig)) - {"velocity"}:
-        output = outputs.position() if name == "position" else outputs.end_torque(rig, rig.ft_end)
-        expected = held_response(rig, output, hz) * late
-        simulated = np.fft.rfft(measured[name][-PERIOD:])[LINES] / asked
-        np.testing.assert_allclose(simulated, expected, rtol=0, atol=1e-5 * np.abs(expected).max())
 
 
 @settings(max_examples=15)

@@ -205,7 +205,7 @@ def test_a_journal_left_behind_is_reported(tmp_path):
     assert (bag / "bag.db3-journal").read_bytes() == b"x" * 600
 
 
-MUTATIONS = 25
+MUTATIONS = 10
 NUMBERS = (0, 1, 255, 2**31 - 1, 2**31, 2**32 - 1, 2**63 - 1, 2**63, 2**64 - 1)
 KINDS = {
     "mcap": (StoragePlugin.MCAP, CompressionMode.NONE),
