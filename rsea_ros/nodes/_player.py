@@ -1,7 +1,6 @@
 """Plays a command on torque_command, on the grid of the measurements' stamps, and ends with zeros.
 
-A live run is played and recorded, and valid only without a failure. What keeps a bench from acting on
-commands, its driver says on /diagnostics: a fault, no activation.
+A live run is played and recorded, and valid only without a failure.
 """
 
 from __future__ import annotations
@@ -28,8 +27,6 @@ MARGIN = SECOND // 100
 """A command that has less than this left until it takes effect is left out: its stamp would not be true."""
 SOFT = 0.1
 """s in which a run that is stopped goes to zero torque, under a raised cosine."""
-
-
 PATIENCE = 1.5
 """s from the first measurement on in which a bench reports its status; a driver does once a second."""
 
@@ -53,10 +50,9 @@ class BenchStatus:
     def fault(self) -> str:
         """What is wrong, in words; empty where nothing is known to be."""
         limit, who = self._most
-        if self._latched or self.largest <= limit:
-            return self._latched
         most = f"expected at most torque_limit = {limit:.4g} N·m of {who}"
-        return f"largest command {self.largest:.4g} N·m, {most}"
+        above = f"largest command {self.largest:.4g} N·m, {most}" if self.largest > limit else ""
+        return self._latched or above
 
     def ready(self) -> bool:
         """Return whether commands may begin."""
@@ -83,10 +79,10 @@ class BenchStatus:
         """Keep a status. bench: the node."""
         values = {pair.key: pair.value for pair in status.values}
         fault, active = values.get("fault", "none"), values.get("active", "True") == "True"
-        self._heard, self._latched, self.zero_first = True, "", values.get("zero_first") == "True"
+        self._heard, self.zero_first = True, values.get("zero_first") == "True"
         self._most = float(values.get("torque_limit", math.inf)), status.name
-        if fault != "none":
-            self._latched = f"{status.name} has latched a fault, {fault}; rsea call {bench} clear_fault"
+        latched = f"{status.name} has latched a fault, {fault}; rsea call {bench} clear_fault"
+        self._latched = latched if fault != "none" else ""
         self.idle = "" if active else f"{status.name} is not active; rsea call {bench} activate"
 
 
@@ -95,23 +91,15 @@ class Player:
 
     bench: says whether it may begin, and whether a driver with autostart wants to see that nobody was under
     way. wanted: subscriptions of torque_command to wait for. publisher: of a node that plays more than once.
-    next: values that are out. left_out: values that came too late.
+    next: values that are out. left_out: values that came too late. rests: it rests, or has.
     """
 
     def __init__(
-        self,
-        node: Node,
-        command: FloatArray,
-        rate: float,
-        bench: BenchStatus,
-        *,
-        lead: float,
-        wanted: int,
-        joint: str,
-        publisher: Publisher[ros.JointState] | None = None,
-    ) -> None:
+        self, node: Node, command: FloatArray, rate: float, bench: BenchStatus, *, lead: float, wanted: int,
+        joint: str, publisher: Publisher[ros.JointState] | None = None,
+    ) -> None:  # fmt: skip
         self.command, self.rate = command, rate
-        self.next, self.left_out, self.started = 0, 0, False
+        self.next, self.left_out, self.started, self.rests = 0, 0, False, False
         self._node, self._lead, self._wanted, self._joint = node, round(lead * SECOND), wanted, joint
         self._stamp, self._last, self.bench, self._zero, self._stopped_at = 0, 0.0, bench, 0.0, -1
         self._publisher = publisher or node.create_publisher(ros.JointState, "torque_command", COMMAND)
@@ -128,11 +116,6 @@ class Player:
         """Go to zero within SOFT s from the value that comes next; the run is over then."""
         if self._stopped_at < 0:
             self._stopped_at = self.next
-
-    @property
-    def rests(self) -> bool:
-        """Whether it keeps the rest that a driver wants to see first."""
-        return self._zero > 0.0
 
     @property
     def stopped(self) -> bool:
@@ -167,7 +150,7 @@ class Player:
         if self.started or self.stopped or self.subscriptions < self._wanted or not self.bench.ready():
             return
         if self.bench.zero_first and not self._zero:
-            self._zero = time.monotonic()
+            self._zero, self.rests = time.monotonic(), True
             self._publisher.publish(ros.torque_command_message(time.time_ns(), 0.0, self._joint))
         if self._zero and time.monotonic() < self._zero + 1.2 * REST:
             return

@@ -154,10 +154,10 @@ class ExperimentNode:
                 self._changed.notify_all()
 
     def _player(self, proposal: Proposal) -> Player:
-        lead, joint = self._values["lead"], self._values["joint"]
+        options = {name: self._values[name] for name in ("lead", "joint")}
         self._bench.largest = float(abs(proposal.command).max())
         plan = self._node, proposal.command, proposal.rate, self._bench
-        return Player(*plan, lead=lead, wanted=2, joint=joint, publisher=self._publisher)
+        return Player(*plan, wanted=2, publisher=self._publisher, **options)
 
     def _take_answer(self, answer: bool, request: Any, response: Any) -> Any:
         with self._changed:
@@ -176,10 +176,8 @@ class ExperimentNode:
             if self._trial is not None:
                 self._trial.stop(self._cancelled)
             self._changed.notify_all()
-        response.success, response.message = (
-            True,
-            "goes softly to zero torque; nothing is learnt from this run",
-        )
+        response.success = True
+        response.message = "goes softly to zero torque; nothing is learnt from this run"
         return response
 
     def is_finished(self) -> bool:
