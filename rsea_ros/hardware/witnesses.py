@@ -28,7 +28,7 @@ UNEVEN = 0.5
 LITTLE = 0.25
 """Of the spring: what an ft that goes with it is at least. No gain of a sound bench is less, so no low-pass
 is needed to tell; delays are held by a hull of the last readings."""
-TURNED = 0.5
+TURNED = 0.6
 """Times the play: for an ft that goes the other way than the spring, by more than LITTLE; play does not."""
 GRAVE, CYCLES, SIDED = 2.5, 2, 0.5
 """Times its doubts by which the spring contradicts ft gravely; readings running that are a fault; part of
