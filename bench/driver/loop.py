@@ -84,8 +84,9 @@ class Loop:
         return "done"
 
     def drive(self) -> None:
-        """Run until torque acts; clear what a stall of the machine has latched."""
+        """Run until torque acts; clear what a stall of the machine has latched, also in a drive on CAN."""
         self.cycles(20)
         while self.is_latched():
-            self.call("clear")
+            if self.call("clear") != "done":
+                self.call("reboot")
             self.cycles(20)

@@ -151,7 +151,7 @@ class GuardedDevice:
         self.state: State | None = None
         self.lifted: list[str] = []
         self.away = self._inferred = self._off = self._off_due = False
-        self._reached = -math.inf
+        self._reached, self._jumped = -math.inf, 0.0
         self._turn, self._tare = threading.Lock(), threading.Lock()
         self._losses = {transfer: Losses(limits.lost_cycles) for transfer in ("read", "write")}
 
@@ -177,7 +177,7 @@ class GuardedDevice:
         otherwise and for a limit of what it does not measure or cannot do, DeviceError; nothing stays open.
         """
         self.device.open()
-        self.state, self._inferred, self.guard.limits = None, False, self._limits
+        self.state, self._inferred, self.guard.limits, self._jumped = None, False, self._limits, 0.0
         self._off, self._off_due = True, False
         for losses in self._losses.values():
             losses.clear()
@@ -269,9 +269,8 @@ class GuardedDevice:
         self._losses["read"].take(lost=False)
         if state.acknowledged_late:
             self._losses["write"].take_back()
-        before, self.state = self.state, state
         latched = self.guard.fault
-        if fault := self._step(before, state):
+        if fault := self._follow(state):
             self.guard.trip(fault)
         self.guard.look(state)
         if self._witnesses and (fault := self._witnesses.take(state, self.guard.torque)):
@@ -281,14 +280,21 @@ class GuardedDevice:
             self._off_due = True
         return state
 
-    def _step(self, before: State | None, state: State) -> DeviceFault | None:
-        """Return the fault of a position that has jumped since the reading before."""
+    def _follow(self, state: State) -> DeviceFault | None:
+        """Take a reading for the newest; return the fault of a position that has jumped meanwhile."""
+        before, self.state = self.state, state
         if before is None:
             return None
         time = max(1e-9 * (state.stamp - before.stamp), self._period)
-        most = STEP * self.guard.limits.velocity * time + COUNTS * self._rating.count
-        step = abs(state.position - before.position)
-        return DeviceFault("position_step", step, most, "rad", f"in {time:.3g} s") if step > most else None
+        step, most = state.position - before.position, self._furthest(time)
+        if not abs(step) > most:
+            return None
+        self._jumped += step
+        return DeviceFault("position_step", abs(step), most, "rad", f"in {time:.3g} s")
+
+    def _furthest(self, time: float) -> float:
+        """Return what a position may change by within a time, rad."""
+        return STEP * self.guard.limits.velocity * time + COUNTS * self._rating.count
 
     def _reach_again(self, error: DeviceError) -> None:
         """Switch a motor off as soon as a port that was lost is back: it goes on with its last goal."""
@@ -397,10 +403,12 @@ class GuardedDevice:
     def _check(self) -> None:
         """Raise DeviceError where a reading has a fault, which is latched."""
         state = self._patiently()
-        fault = self._step(self.state, state) or self.guard.complaint(state)
+        fault = self._follow(state) or self.guard.complaint(state)
         if fault is not None:
             self.guard.trip(fault)
             raise DeviceError(f"{fault} is still there, expected it to be over")
+        if abs(self._jumped) > self._furthest(self._period):
+            raise DeviceError(f"position jumped by {self._jumped:.3g} rad, expected cleanup and configure")
 
     def _switch_on(self) -> None:
         self._off = self._off_due = False

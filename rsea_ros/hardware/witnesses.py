@@ -28,6 +28,8 @@ UNEVEN = 0.5
 LITTLE = 0.25
 """Of the spring: what an ft that goes with it is at least. No gain of a sound bench is less, so no low-pass
 is needed to tell; delays are held by a hull of the last readings."""
+TURNED = 0.6
+"""Times the play: for an ft that goes the other way than the spring, by more than LITTLE; play does not."""
 GRAVE, CYCLES, SIDED = 2.5, 2, 0.5
 """Times its doubts by which the spring contradicts ft gravely; readings running that are a fault; part of
 that by which the motor may be off the spring that it sides with."""
@@ -166,30 +168,31 @@ class Witnesses:
         most = GRAVE * max(self._rig.bent * least, self._rig.play)
         sided = abs(bend - low.motor) + hasty < SIDED * off
         if not (sided and off - late - self._noise > most):
-            most = GRAVE * self._rig.play
-            low, off = self._lately[-1], self._opposed(low, most)
+            low, (off, most) = self._lately[-1], self._opposed(low)
             self._grave = self._grave if off - self._noise > most else -1
         self._grave += 1
         if self._grave < CYCLES:
             return None
         return DeviceFault("ft", off, most, "N m", f"off: {self._told(low)}")
 
-    def _opposed(self, low: Signals, least: float) -> float:
-        """Return by how much ft goes against the spring and the motor sides with that, N m; else 0.
+    def _opposed(self, low: Signals) -> tuple[float, float]:
+        """Return by how much ft goes against the spring and the motor sides with it, or 0, and a limit, N m.
 
         One that is late is among the last torques of the other, so each is held against all of them. An ft
-        that has another zero changes as the spring does. least: what counts, N m.
+        that has another zero changes as the spring does.
         """
         now, zero = self._lately[-1], self._zero
-        if abs(now.spring + zero - now.ft) <= least:
-            return 0.0
+        spring, rise, bent = now.spring + zero, now.ft - low.ft, now.spring - low.spring
+        turned = now.ft * spring < -LITTLE * spring**2 and rise * bent < -LITTLE * bent**2
+        least = (TURNED if turned else GRAVE) * self._rig.play
+        if abs(spring - now.ft) <= least:
+            return 0.0, least
         bend = _nearest(now.ft, [x.spring + zero for x in self._lately])
-        felt = _nearest(now.spring + zero, [x.ft for x in self._lately])
+        felt = _nearest(spring, [x.ft for x in self._lately])
         off, made = bend - now.ft, _nearest(now.ft, [x.motor for x in self._lately]) - now.ft
-        rise, bent = now.ft - low.ft, now.spring - low.spring
         against = now.ft * bend <= LITTLE * bend**2 and rise * bent <= LITTLE * bent**2
         sided = made * off >= SIDED * off**2
-        return min(abs(off), abs(now.spring + zero - felt)) if against and sided else 0.0
+        return min(abs(off), abs(spring - felt)) if against and sided else 0.0, least
 
     def _followed(self, window: Window, low: Signals) -> Window:
         part = min(max(1.0 / (window.readings + 1), self._period / MEMORY), 1.0)

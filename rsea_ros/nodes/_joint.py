@@ -216,11 +216,11 @@ def stop(joints: Sequence[DrivenJoint]) -> str:
 
     Raises DeviceError where a motor has not acknowledged that it is off; the stop holds all the same.
     """
-    for drive in [joint.opened() for joint in joints]:
+    for drive in [joint.drive for joint in joints if joint.drive is not None]:
         drive.stop()
     time.sleep(OVERTAKING)
     end = time.monotonic() + CONFIRMING
-    while on := [joint for joint in joints if not joint.guarded.is_off]:
+    while on := [joint for joint in joints if joint.drive is not None and not joint.guarded.is_off]:
         if time.monotonic() > end:
             if all(joint.guarded.away for joint in on):
                 raise DeviceError(
@@ -232,7 +232,8 @@ def stop(joints: Sequence[DrivenJoint]) -> str:
                 f" to be off within {CONFIRMING:g} s: cut its power"
             )
         time.sleep(0.1 * OVERTAKING)
-    return "torque zero until clear_fault, the motor is off"
+    driven = any(joint.drive is not None for joint in joints)
+    return f"torque zero until clear_fault, the {'motor is off' if driven else 'driver is not configured'}"
 
 
 def stop_of(
@@ -246,8 +247,7 @@ def stop_of(
 
     def hold() -> None:
         for joint in joints:
-            if joint.drive is not None:
-                joint.guarded.stop(is_answered=False)
+            joint.guarded.stop(is_answered=False)
 
     def answer() -> None:
         take_up(offers)

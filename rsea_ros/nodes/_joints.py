@@ -4,9 +4,10 @@ import re
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
-from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
 from rclpy.node import Node
 from rclpy.task import Future
 
@@ -85,9 +86,20 @@ class Jobs:
         while self._waiting and self._node.executor is not None:
             self._node.executor.create_task(*self._waiting.pop(0))
 
-    async def do(self, work: Callable[[], str]) -> str:
+    def set_parameters(self) -> None:
+        """Set the node's parameters in threads, too, one after the other: a design of gains takes seconds."""
+        group = MutuallyExclusiveCallbackGroup()
+        for service in self._node.services:
+            if "/set_parameters" in service.service_name:
+                service.callback, service.callback_group = partial(self._apart, service.callback), group
+                group.add_entity(service)
+
+    async def _apart(self, serve: Callable[..., Any], *request: Any) -> Any:
+        return await self.do(partial(serve, *request))
+
+    async def do(self, work: Callable[[], Any]) -> Any:
         """Return the result of the work or raise its error; the executor goes on meanwhile."""
-        future: Future[str] = Future()
+        future: Future[Any] = Future()
 
         def fulfil() -> None:
             try:
@@ -101,7 +113,7 @@ class Jobs:
         thread.start()
         raise_new_threads()
         try:
-            return str(await future)
+            return await future
         finally:
             self._threads.discard(thread)
             if not (self._threads or self._waiting):

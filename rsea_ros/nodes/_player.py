@@ -5,6 +5,7 @@ A live run is played and recorded, and valid only without a failure.
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 
@@ -17,7 +18,7 @@ from rsea_ros.errors import DeviceError, RseaError
 from rsea_ros.experiment.joint_weighing import SHORTEST
 from rsea_ros.nodes._cycle import SECOND, Cycle, on_grid
 from rsea_ros.nodes._drive import REST
-from rsea_ros.nodes._qos import COMMAND, DISCOVERY_TIME, MEASUREMENT, await_arrival
+from rsea_ros.nodes._qos import COMMAND, DISCOVERY_TIME, MEASUREMENT, await_arrival, publishers_of
 from rsea_ros.nodes._tap import Ears
 from rsea_ros.records.record import FloatArray, Record
 
@@ -26,35 +27,81 @@ MARGIN = SECOND // 100
 """A command that has less than this left until it takes effect is left out: its stamp would not be true."""
 SOFT = 0.1
 """s in which a run that is stopped goes to zero torque, under a raised cosine."""
+PATIENCE = 1.5
+"""s from the first measurement on in which a bench reports its status; a driver does once a second."""
+
+
+class BenchStatus:
+    """The status of the node that publishes joint_states, of one of its joints where it has several.
+
+    idle: why commands would have no effect now though nothing is wrong, or nothing. zero_first: whether a
+    rest must come before torque. largest: N m, of the commands; a driver that limits them below that is a
+    fault of the run.
+    """
+
+    def __init__(self, node: Node, joint: str, largest: float = 0.0) -> None:
+        self._node, self._joint, self.largest = node, joint, largest
+        self._heard, self._measured, self._latched, self.idle, self.zero_first = False, 0.0, "", "", False
+        self._most = math.inf, ""
+        self._states = node.create_subscription(ros.JointState, "joint_states", self._on_state, MEASUREMENT)
+        node.create_subscription(ros.DiagnosticArray, "/diagnostics", self._on_health, COMMAND)
+
+    @property
+    def fault(self) -> str:
+        """What is wrong, in words; empty where nothing is known to be."""
+        limit, who = self._most
+        most = f"expected at most torque_limit = {limit:.4g} N·m of {who}"
+        above = f"largest command {self.largest:.4g} N·m, {most}" if self.largest > limit else ""
+        return self._latched or above
+
+    def ready(self) -> bool:
+        """Return whether commands may begin."""
+        known = self._heard or (self._measured and time.monotonic() - self._measured > PATIENCE)
+        return bool(known) and not self.fault and not self.idle
+
+    def check(self, *, playing: bool) -> None:
+        """Raise DeviceError for a fault, and for a driver that lost its activation under way."""
+        if why := self.fault or (playing and self.idle):
+            raise DeviceError(why)
+
+    def _on_state(self, message: ros.JointState) -> None:
+        self._measured = time.monotonic()
+        self._node.destroy_subscription(self._states)
+
+    def _on_health(self, message: ros.DiagnosticArray) -> None:
+        benches = publishers_of(self._node, "joint_states")
+        for status in message.status:
+            for bench in benches:
+                if status.name in (bench, f"{bench}/{self._joint}"):
+                    self._see(status, bench)
+
+    def _see(self, status: ros.DiagnosticStatus, bench: str) -> None:
+        """Keep a status. bench: the node."""
+        values = {pair.key: pair.value for pair in status.values}
+        fault, active = values.get("fault", "none"), values.get("active", "True") == "True"
+        self._heard, self.zero_first = True, values.get("zero_first") == "True"
+        self._most = float(values.get("torque_limit", math.inf)), status.name
+        latched = f"{status.name} has latched a fault, {fault}; rsea call {bench} clear_fault"
+        self._latched = latched if fault != "none" else ""
+        self.idle = "" if active else f"{status.name} is not active; rsea call {bench} activate"
 
 
 class Player:
     """Publishes one command (N m, at `rate` Hz), each value `lead` s before it takes effect.
 
-    wanted: subscriptions of torque_command to wait for. ready: whether it may begin, beside that.
-    zero_first: whether a driver with autostart wants to see that nobody was under way.
-    publisher: of a node that plays more than once.
-    next: values that are out. left_out: values that came too late.
+    bench: says whether it may begin, and whether a driver with autostart wants to see that nobody was under
+    way. wanted: subscriptions of torque_command to wait for. publisher: of a node that plays more than once.
+    next: values that are out. left_out: values that came too late. rests: it rests, or has.
     """
 
     def __init__(
-        self,
-        node: Node,
-        command: FloatArray,
-        rate: float,
-        *,
-        lead: float,
-        wanted: int,
-        joint: str,
-        ready: Callable[[], bool] = lambda: True,
-        zero_first: Callable[[], bool] = lambda: False,
-        publisher: Publisher[ros.JointState] | None = None,
-    ) -> None:
+        self, node: Node, command: FloatArray, rate: float, bench: BenchStatus, *, lead: float, wanted: int,
+        joint: str, publisher: Publisher[ros.JointState] | None = None,
+    ) -> None:  # fmt: skip
         self.command, self.rate = command, rate
-        self.next, self.left_out, self.started = 0, 0, False
+        self.next, self.left_out, self.started, self.rests = 0, 0, False, False
         self._node, self._lead, self._wanted, self._joint = node, round(lead * SECOND), wanted, joint
-        self._stamp, self._last, self._ready, self._zero_first, self._zero = 0, 0.0, ready, zero_first, 0.0
-        self._stopped_at = -1
+        self._stamp, self._last, self.bench, self._zero, self._stopped_at = 0, 0.0, bench, 0.0, -1
         self._publisher = publisher or node.create_publisher(ros.JointState, "torque_command", COMMAND)
         states = ros.JointState, "joint_states", self._begin, MEASUREMENT
         self._measurements = node.create_subscription(*states)
@@ -100,10 +147,10 @@ class Player:
 
     def _begin(self, message: ros.JointState) -> None:
         """Start at a whole number of periods after a measurement, once all subscribers listen."""
-        if self.started or self.stopped or self.subscriptions < self._wanted or not self._ready():
+        if self.started or self.stopped or self.subscriptions < self._wanted or not self.bench.ready():
             return
-        if self._zero_first() and not self._zero:
-            self._zero = time.monotonic()
+        if self.bench.zero_first and not self._zero:
+            self._zero, self.rests = time.monotonic(), True
             self._publisher.publish(ros.torque_command_message(time.time_ns(), 0.0, self._joint))
         if self._zero and time.monotonic() < self._zero + 1.2 * REST:
             return
@@ -193,11 +240,13 @@ class LiveRun:
         self._player.stop()
 
     def waits(self) -> float:
-        """Return for how long it has waited for its bench, s; 0 once it plays."""
-        return 0.0 if self._player.started else time.monotonic() - self._begun
+        """Return for how long it has waited for its bench, s; 0 once that heard of it."""
+        return 0.0 if self._player.started or self._player.rests else time.monotonic() - self._begun
 
     def over(self) -> bool:
         """Return whether the run and its recording are over; stops it where the bench falls silent."""
+        if not self._player.started and (fault := self._player.bench.fault):
+            self.stop(fault)
         silent = time.monotonic() - self._ears.last
         if self._player.started and silent > SILENT:
             self.stop(f"no measurement for {silent:.2f} s")

@@ -145,7 +145,7 @@ def run_nodes(components: Sequence[Component], arguments: Sequence[str] = ()) ->
         _initialise(arguments, waits_for_nobody=any(each.waits_for_nobody for each in components))
         if effects := os.environ.get("RSEA_EFFECTS"):
             log.warning(f"RSEA_EFFECTS={printable(effects)}: code from there runs in this node")
-        done = _work(components, stop)
+        done = _work(sorted(components, key=lambda each: each.kind is Node), stop)  # drivers are first
         endless = all(each.endless for each in components)
         return SUCCESS if done or (endless and stop.status - Stopped.BASE in STOPPING) else stop.status
     except Stopped as stopped:

@@ -25,22 +25,22 @@ from rsea_ros.nodes import _control
 from rsea_ros.nodes._control import TABLE, ControllerLimits, controller_of, design_of, summary, with_limits
 from rsea_ros.nodes._cycle import SECOND, Anchor
 from rsea_ros.nodes._health import ERROR, OK, WARN, Health, NodeHealth
+from rsea_ros.nodes._joints import Jobs
 from rsea_ros.nodes._link import Measurements, link_of, link_values, link_words
 from rsea_ros.nodes._parameters import let_change
 from rsea_ros.nodes._qos import COMMAND, await_arrival
 from rsea_ros.nodes._realtime import keep_time
-from rsea_ros.nodes._run import Component
+from rsea_ros.nodes._run import Component, Program
 from rsea_ros.nodes._waiter import Waiter
 
 WATCH = 0.005
 """s between two looks at the age of the last measurement."""
-
 CLOSING_ZEROS = 3
 FADE = 0.02
 """Part by which a desired torque's lateness replaces the mean of those before."""
 
 
-class ControllerNode:
+class ControllerNode(Program):
     """One command for each measurement, stamped with the place of the next: one sample of delay, always.
 
     Not with the measurement's own stamp and a period: one that is late would act in the cycle after.
@@ -78,6 +78,7 @@ class ControllerNode:
         self._waiter = Waiter(node, self._inputs.subscriptions, self._work, WATCH)
         keep_time(node, self._waiter, values)
         let_change(node, TABLE, self._change)
+        Jobs(node).set_parameters()  # for a driver in the same executor has to hear a stop meanwhile
 
     def _change(self, new: dict[str, Any]) -> None:
         """Take new limits, raised ones only without torque, and gains, which begin softly.
@@ -237,9 +238,6 @@ class ControllerNode:
             self._node.get_logger().error(f"{self._told_fault}; torque zero until clear_fault")
             self._health.publish()
         return not self._waiter.is_running()
-
-    def conclude(self) -> None:
-        """Leave nothing to do: `close` commands the zeros."""
 
     def close(self) -> None:
         """Command zero torque, and wait until that has arrived."""

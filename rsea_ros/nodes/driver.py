@@ -29,7 +29,7 @@ from rsea_ros.nodes._joint import DrivenJoint, Offer, stop_of
 from rsea_ros.nodes._joints import JOINTS, Jobs, joint_table, joint_values
 from rsea_ros.nodes._parameters import NodeParameter, let_change, live
 from rsea_ros.nodes._realtime import REALTIME, keep_time, stop_keeping_time
-from rsea_ros.nodes._run import Component, SignalListener
+from rsea_ros.nodes._run import Component, Program, SignalListener
 
 TABLE = (
     NodeParameter("device", "simulated", f"what to drive: {', '.join(DEVICES)}, or one of RSEA_DEVICES"),
@@ -55,7 +55,7 @@ PATIENCE = 10.0
 """s that a reboot may take which is under way when the program ends."""
 
 
-class DriverNode(ManagedEntity):
+class DriverNode(ManagedEntity, Program):
     """The joints and their cycle, from configure to cleanup. joints: one, or those of the parameter."""
 
     def __init__(self, node: LifecycleNode, values: dict[str, Any]) -> None:
@@ -171,9 +171,6 @@ class DriverNode(ManagedEntity):
                 self._node.trigger_deactivate()
             self._node.trigger_cleanup()
         return False
-
-    def conclude(self) -> None:
-        """Leave nothing to do."""
 
     def close(self) -> None:
         """Zero torque, devices closed, topics removed; also without any."""

@@ -1,85 +1,22 @@
 """excite: plays an excitation as torque commands, and always ends with zeros.
 
 It waits for a driver that is not active, and ends with one line where it has latched a fault.
-
-What keeps a bench from acting on commands, as its driver says on /diagnostics: a fault, no activation.
 """
 
-import math
 import sys
-import time
 from typing import Any
 
 from rclpy.node import Node
 
-from msg_adapters.ros import DiagnosticArray, DiagnosticStatus, JointState
-from rsea_ros.errors import DeviceError
 from rsea_ros.experiment.run_shape import read_run
 from rsea_ros.identification.excitation import KINDS, ExcitationSettings, check_limits, excitation
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.rig_limits import derive
 from rsea_ros.nodes._health import OK, STEADY, WARN, Health, NodeHealth
 from rsea_ros.nodes._parameters import DERIVED, JOINT, NodeParameter, stated_limits
-from rsea_ros.nodes._player import Player
-from rsea_ros.nodes._qos import COMMAND, MEASUREMENT, publishers_of
+from rsea_ros.nodes._player import BenchStatus, Player
 from rsea_ros.nodes._run import Component, Program
 from rsea_ros.records.record import FloatArray
-
-PATIENCE = 1.5
-"""s from the first measurement on in which a bench reports its status; a driver does once a second."""
-
-
-class BenchStatus:
-    """The status of the node that publishes joint_states, of one of its joints where it has several.
-
-    idle: why commands would have no effect now though nothing is wrong, or nothing. zero_first: whether a
-    rest must come before torque. largest: N m, of the commands; a driver that limits them below that is a
-    fault of the run.
-    """
-
-    def __init__(self, node: Node, joint: str, largest: float) -> None:
-        self._node, self._joint, self._largest = node, joint, largest
-        self._heard, self._measured, self._fault, self.idle, self.zero_first = False, 0.0, "", "", False
-        self._states = node.create_subscription(JointState, "joint_states", self._on_state, MEASUREMENT)
-        node.create_subscription(DiagnosticArray, "/diagnostics", self._on_health, COMMAND)
-
-    def ready(self) -> bool:
-        """Return whether commands may begin."""
-        known = self._heard or (self._measured and time.monotonic() - self._measured > PATIENCE)
-        return bool(known) and not self._fault and not self.idle
-
-    def check(self, *, playing: bool) -> None:
-        """Raise DeviceError for a fault, and for a driver that lost its activation under way."""
-        if self._fault:
-            raise DeviceError(self._fault)
-        if playing and self.idle:
-            raise DeviceError(self.idle)
-
-    def _on_state(self, message: JointState) -> None:
-        self._measured = time.monotonic()
-        self._node.destroy_subscription(self._states)
-
-    def _on_health(self, message: DiagnosticArray) -> None:
-        benches = publishers_of(self._node, "joint_states")
-        for status in message.status:
-            for bench in benches:
-                if status.name in (bench, f"{bench}/{self._joint}"):
-                    self._see(status, bench)
-
-    def _see(self, status: DiagnosticStatus, bench: str) -> None:
-        """Keep a status. bench: the node."""
-        values = {pair.key: pair.value for pair in status.values}
-        fault, active = values.get("fault", "none"), values.get("active", "True") == "True"
-        self._heard, self._fault, self.zero_first = True, "", values.get("zero_first") == "True"
-        if fault != "none":
-            self._fault = f"{status.name} has latched a fault, {fault}; rsea call {bench} clear_fault"
-        elif self._largest > (limit := float(values.get("torque_limit", math.inf))):
-            self._fault = (
-                f"largest command {self._largest:.4g} N·m, expected at most torque_limit = {limit:.4g} N·m"
-                f" of {status.name}"
-            )
-        self.idle = "" if active else f"{status.name} is not active; rsea call {bench} activate"
-
 
 TABLE = (
     NodeParameter("file", "", "run.csv of rsea experiment to play instead; empty: what follows"),
@@ -96,12 +33,8 @@ TABLE = (
     NodeParameter("seed", 0, "seed of noise and phases", "", 0, 1_000_000_000),
     NodeParameter("rig", "paper_high_impedance", "the bench: a name of config/rigs, or a model.yaml"),
     NodeParameter(
-        "limit",
-        DERIVED,
-        "largest torque, of the whole excitation; -1: as the driver derives it",
-        "N m",
-        DERIVED,
-        1e4,
+        "limit", DERIVED, "largest torque, of the whole excitation; -1: as the driver derives it", "N m",
+        DERIVED, 1e4,
     ),
     NodeParameter("ramp", 0.5, "raised cosine at either end", "s", 0.0, 100.0),
     NodeParameter("lead", 0.1, "how long before it takes effect a command is published", "s", 0.0, 0.2),
@@ -120,9 +53,8 @@ class ExciteNode(Program):
         self._node, self._wanted = node, values["subscribers"]
         self._bench = BenchStatus(node, values["joint"], float(abs(command).max(initial=0.0)))
         self._player = Player(
-            node, command, rate, lead=values["lead"], wanted=self._wanted, joint=values["joint"],
-            ready=self._bench.ready, zero_first=lambda: self._bench.zero_first,
-        )  # fmt: skip
+            node, command, rate, self._bench, lead=values["lead"], wanted=self._wanted, joint=values["joint"]
+        )
         self._health = Health(node, self._report)
         node.create_timer(1.0, self._tell, clock=STEADY)
 

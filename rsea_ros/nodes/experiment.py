@@ -24,7 +24,7 @@ from rsea_ros.experiment.run_shape import limits_from
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.nodes._health import OK, STEADY, WARN, Health, NodeHealth
 from rsea_ros.nodes._parameters import AXIS, JOINT, NodeParameter
-from rsea_ros.nodes._player import BenchEars, LiveRun, Player
+from rsea_ros.nodes._player import BenchEars, BenchStatus, LiveRun, Player
 from rsea_ros.nodes._qos import COMMAND
 from rsea_ros.nodes._run import Component
 from rsea_ros.outputs.files import Destination, unused_path
@@ -73,6 +73,7 @@ class ExperimentNode:
         check_session_free(self._out)
         self._publisher = node.create_publisher(JointState, "torque_command", COMMAND)
         self._ears = BenchEars(node, values["axis"])
+        self._bench = BenchStatus(node, values["joint"])
         self._trial: LiveRun | None = None
         self._proposal: Proposal | None = None
         self._round: Round | None = None
@@ -144,7 +145,8 @@ class ExperimentNode:
             elif self._values["ask"] and self._trial.waits() > self._values["approval"]:
                 self._trial.close()
                 self._trial = self._answer = None
-                text = f"no bench within {self._values['approval']:g} s: the approval has expired"
+                why = self._bench.idle or "no bench"
+                text = f"{why} within {self._values['approval']:g} s: the approval has expired"
                 self._node.get_logger().warning(text)
             elif self._trial.over():
                 self._trial.close()
@@ -152,9 +154,10 @@ class ExperimentNode:
                 self._changed.notify_all()
 
     def _player(self, proposal: Proposal) -> Player:
-        lead, joint = self._values["lead"], self._values["joint"]
-        command, rate = proposal.command, proposal.rate
-        return Player(self._node, command, rate, lead=lead, wanted=2, joint=joint, publisher=self._publisher)
+        options = {name: self._values[name] for name in ("lead", "joint")}
+        self._bench.largest = float(abs(proposal.command).max())
+        plan = self._node, proposal.command, proposal.rate, self._bench
+        return Player(*plan, wanted=2, publisher=self._publisher, **options)
 
     def _take_answer(self, answer: bool, request: Any, response: Any) -> Any:
         with self._changed:
@@ -173,10 +176,8 @@ class ExperimentNode:
             if self._trial is not None:
                 self._trial.stop(self._cancelled)
             self._changed.notify_all()
-        response.success, response.message = (
-            True,
-            "goes softly to zero torque; nothing is learnt from this run",
-        )
+        response.success = True
+        response.message = "goes softly to zero torque; nothing is learnt from this run"
         return response
 
     def is_finished(self) -> bool:

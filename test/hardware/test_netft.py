@@ -8,6 +8,7 @@ import socket
 import struct
 import threading
 import time
+from types import SimpleNamespace
 
 import pytest
 from scipy import constants
@@ -16,7 +17,7 @@ from rsea_ros.errors import DeviceError
 from rsea_ros.hardware.netft import calibration
 from rsea_ros.hardware.netft.calibration import parse
 from rsea_ros.hardware.netft.rdt import RESYNCHRONISE, RdtRecord, Sequence, decode, request, trouble
-from rsea_ros.hardware.netft.receiver import Arrival, DatagramReceiver
+from rsea_ros.hardware.netft.receiver import HELD, Arrival, DatagramReceiver
 from rsea_ros.hardware.netft.sensor import Stillness
 from test.nodes.stalls import until
 
@@ -144,6 +145,21 @@ def streamed():
         assert asked == request(2)
         yield receiver, sensor, client
         receiver.close()
+
+
+def test_records_that_come_faster_than_they_are_read_hold_up_no_cycle():
+    """At 7 kHz beside other work a cycle lasted 11 s, under torque."""
+    receiver, taken = DatagramReceiver("", 0), []
+
+    def recvmsg(*_):
+        taken.append(len(taken))
+        assert len(taken) < 10_000
+        return datagram(len(taken)), [], 0, None
+
+    receiver._thread, receiver._socket = threading.current_thread(), SimpleNamespace(recvmsg=recvmsg)
+    receiver._keep = lambda *told: None
+    receiver.drain()
+    assert len(taken) == HELD
 
 
 def until_heard(receiver, sequence):

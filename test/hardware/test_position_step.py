@@ -6,12 +6,14 @@ from dataclasses import replace
 
 import pytest
 
+from rsea_ros.errors import DeviceError
 from rsea_ros.hardware.device import State
 from rsea_ros.hardware.dynamixel.control_tables import TABLES, MotorConnection, TorqueConstant
 from rsea_ros.hardware.dynamixel.motor import Motor
 from rsea_ros.hardware.dynamixel.own_limits import OwnLimits
 from rsea_ros.hardware.guarded import GuardedDevice
-from rsea_ros.hardware.limits import Limits
+from rsea_ros.hardware.interlock import DeviceFault
+from rsea_ros.hardware.limits import Limits, Rating
 from rsea_ros.hardware.mit_can.motor import CanConnection, MitMotor
 from rsea_ros.hardware.mit_can.tables import _families
 from rsea_ros.hardware.simulated import SimulatedDevice
@@ -70,6 +72,36 @@ def test_a_rotor_at_its_velocity_limit_is_no_fault_and_a_jump_beyond_it_is(model
         device.turn(100 / rate, joint.state.position + 2.0 * velocity / rate + 4.0 * count, velocity)
         joint.read()
         assert joint.fault.cause == "position_step", velocity
+
+
+@pytest.mark.parametrize("meanwhile", [False, True])
+def test_a_jump_is_cleared_once_the_position_is_where_it_was_and_not_before(meanwhile):
+    """It was cleared where it was: the limit of a free end had moved with it.
+
+    meanwhile: whether it jumps while a service has the device.
+    """
+    device = Turning(Rating(count=1e-3))
+    joint = GuardedDevice(device, Limits(64.0, deflection=math.inf, velocity=2.0, position=1.5), 280.0)
+    joint.open()
+    joint.read()
+    device.turn(1 / 280.0, 1.0, 0.0)
+    if meanwhile:
+        joint.guard.trip(DeviceFault("ft"))
+        with pytest.raises(DeviceError, match=r"position_step: 1 rad.* is still there"):
+            joint.clear()
+    for k in range(2, 500):
+        device.turn(k / 280.0, 1.0 + 1e-3 * (k % 2), 0.0)
+        joint.read()
+    with pytest.raises(DeviceError, match="position jumped by 1 rad, expected cleanup and configure"):
+        joint.clear()
+    device.turn(500 / 280.0, 0.002, 0.0)
+    joint.read()
+    assert joint.clear() and joint.fault is None
+    device.turn(501 / 280.0, 1.0, 0.0)
+    joint.read()
+    joint.open()
+    joint.read()
+    assert joint.fault is None
 
 
 @pytest.mark.parametrize("sensors", [{"position": Sensor(1e-3)}, {"position": Sensor(2e-3, 5e-3)}, {}])

@@ -125,7 +125,7 @@ class Listener:
             self.node = rclpy.create_node("listener")
         self.executor = executor()
         self.executor.add_node(self.node)
-        self.subscriptions, self._clients = [], {}
+        self.subscriptions, self.clients = [], {}
 
     def serve(self, node):
         """Spin another node of this process too, until it is dropped. Its module says SERVES."""
@@ -162,9 +162,9 @@ class Listener:
         Called again where it does not come: the first answer to a new client is lost now and then, because
         the node has found the client's requests before it found where the answers go.
         """
-        if name not in self._clients:
-            self._clients[name] = self.node.create_client(kind, name)
-        client, answers = self._clients[name], []
+        if name not in self.clients:
+            self.clients[name] = self.node.create_client(kind, name)
+        client, answers = self.clients[name], []
         self.until(client.service_is_ready)
 
         def ask():
@@ -237,15 +237,21 @@ def make_driver(listener):
 DOUBLE = 3
 
 
+def setting(**values):
+    """Return the request that sets parameters together."""
+    request = SetParametersAtomically.Request()
+    for name, value in values.items():
+        told = ParameterValue(type=DOUBLE, double_value=value)
+        request.parameters.append(Parameter(name=name.replace("__", "."), value=told))
+    return request
+
+
 @pytest.fixture
 def put(listener):
     """A function that sets parameters of a node over its service; its answer's reason, empty for none."""
 
     def ask(node, **values):
-        request = SetParametersAtomically.Request()
-        for name, value in values.items():
-            told = ParameterValue(type=DOUBLE, double_value=value)
-            request.parameters.append(Parameter(name=name.replace("__", "."), value=told))
+        request = setting(**values)
         name = node if isinstance(node, str) else node.get_fully_qualified_name()
         service = f"{name}/set_parameters_atomically"
         answer = listener.call(service, SetParametersAtomically, request).result

@@ -84,7 +84,7 @@ class Driven:
 
     def request(self, service):
         """Call a Trigger service; return the future of its answer. For one that was called before."""
-        client = self._listener._clients[f"/{self.name}/driver/{service}"]
+        client = self._listener.clients[f"/{self.name}/driver/{service}"]
         return client.call_async(Trigger.Request())
 
     def change(self, transition):

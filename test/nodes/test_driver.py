@@ -84,6 +84,22 @@ def test_a_free_end_without_a_position_limit_is_not_activated_unless_that_is_ask
     assert shown["refused"] == 0 and "position_limit 1 rad, deflection_limit none" in str(shown["limits"])
 
 
+def test_a_stop_before_configure_is_kept_until_a_clear(listener, make_driver, monkeypatch):
+    """It was answered that the driver is not configured, and forgotten: an activation made torque."""
+    monkeypatch.setattr(driver, "DEVICES", {"simulated": lambda values: Spy()})
+    program, node = make_driver("early", autostart=False)
+    state = lambda: node._state_machine.current_state[1]  # noqa: E731
+    told = listener.call("/early/early/stop")
+    assert told.success and "torque zero until clear_fault, the driver is not configured" in told.message
+    assert not listener.call("/early/early/clear_fault").success
+    node.trigger_configure()
+    node.trigger_activate()
+    assert state() == "inactive" and program.joints[0].report().values["fault"].cause == "stopped"
+    assert listener.call("/early/early/clear_fault").success
+    node.trigger_activate()
+    assert state() == "active"
+
+
 @pytest.mark.parametrize("way", ["trigger_deactivate", "trigger_shutdown"])
 def test_every_transition_out_of_active_writes_zero(spied, way):
     spy, _, node = spied

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from msg_adapters import write_record
-from msg_adapters.ros import DiagnosticArray, JointState
+from msg_adapters.ros import DiagnosticArray, JointState, stamp_of
 from rsea_ros.experiment.run_shape import Shape, command_of, run_text
 from rsea_ros.model.rig_file import load_rig, save_rig
 from rsea_ros.model.simulation import synthesize
@@ -43,15 +43,19 @@ def ask(listener):
 
 @pytest.fixture
 def session(bench, start, listener, tmp_path):
-    """A function that starts a plant and a node that asks; the plant ends with the test."""
+    """A function that starts a plant and a node that asks; the plant ends with the test.
+
+    driven: parameters of a driver in its place.
+    """
     plants = []  # one of an earlier test would answer for one that was killed
 
-    def begin(**values):
+    def begin(driven=(), **values):
         for plant in plants:
             plant.kill()
         commands = listener.hear(JointState, "/rsea/torque_command", COMMAND)
         health = listener.hear(DiagnosticArray, "/diagnostics", COMMAND)
-        plant, out = start("plant", rig=bench / "bench.yaml"), tmp_path / f"out{len(plants)}"
+        kind, out = "driver" if driven else "plant", tmp_path / f"out{len(plants)}"
+        plant = start(kind, rig=bench / "bench.yaml", **dict(driven))
         node = start(
             "quick_experiment", rig=RIG, bag=bench / "slow.mcap", out=out,
             causes="current_loop_lag", limits=f"torque={LIMIT}", **values,
@@ -167,6 +171,15 @@ def test_an_approval_without_a_bench_expires_and_the_death_of_a_bench_ends_the_s
     assert said["seconds"] == 0.0
     listener.until(lambda: asked.commands[-1].effort[0] == 0.0)
     assert not list(asked.out.glob("run-*.mcap"))
+
+
+def test_a_driver_with_autostart_sees_a_rest_before_a_run(approved):
+    """It latched `restarted` at the first torque, as it did for `excite`, and the session was over."""
+    driven = {"device": "simulated", "autostart": True, "command_timeout": 1.0}
+    first = approved(lambda asked: list(asked.out.glob("run-*")), driven=driven, longest=2.0)
+    stamps = [stamp_of(message.header.stamp) for message in first.commands]
+    assert list(first.out.glob("run-1.mcap")), told(first.out)
+    assert first.commands[0].effort[0] == 0.0 and stamps[1] - stamps[0] > 1.0e9
 
 
 def test_a_run_confirms_the_cause(approved):

@@ -7,6 +7,7 @@ from concurrent.futures import Future
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from rsea_ros.errors import DeviceError, ParameterError, RseaError
@@ -28,7 +29,7 @@ def node(monkeypatch):
     made._trial = made._proposal = made._round = made._answer = None
     made._work = Future()
     made._health = SimpleNamespace(publish=lambda: calls.append("health"))
-    made._ears, made._publisher = "ears", "publisher"
+    made._ears, made._publisher, made._bench = "ears", "publisher", SimpleNamespace(idle="", largest=0.0)
     return made
 
 
@@ -72,13 +73,15 @@ def test_an_approved_run_begins_and_is_closed_when_it_is_over(node, monkeypatch)
     monkeypatch.setattr(module, "LiveRun", lambda ears, player: node.calls.append((ears, player)) or made)
     monkeypatch.setattr(module, "Player", lambda *a, **k: (a[1:], k))
     node._look()
-    node._proposal = SimpleNamespace(command="command", rate=280.0)
+    command = np.array([1.0, -3.0])
+    node._proposal = SimpleNamespace(command=command, rate=280.0)
     node._look()
     assert node.calls == [] and node._trial is None
     node._answer = True
     node._look()
     options = {"lead": 0.1, "wanted": 2, "joint": "hip", "publisher": "publisher"}
-    assert node._trial is made and node.calls == [("ears", (("command", 280.0), options))]
+    assert node._trial is made and node.calls == [("ears", ((command, 280.0, node._bench), options))]
+    assert node._bench.largest == 3.0
     node._look()
     assert node._proposal is not None and len(node.calls) == 1
     made.over = lambda: True
@@ -89,12 +92,14 @@ def test_an_approved_run_begins_and_is_closed_when_it_is_over(node, monkeypatch)
 @pytest.mark.parametrize(
     ("waits", "is_asked", "expires"), [(10.1, True, True), (9.9, True, False), (10.1, False, False)]
 )
-def test_an_approval_expires_where_no_bench_comes(node, waits, is_asked, expires):
+@pytest.mark.parametrize("idle", ["", "/rsea/driver is not active"])
+def test_an_approval_expires_where_no_bench_comes(node, waits, is_asked, expires, idle):
+    node._bench.idle = idle
     node._proposal, node._answer, node._trial = "it", True, trial(node, waits=waits)
     node._values["ask"] = is_asked
     node._look()
     assert (node._trial is None) == (node._answer is None) == expires and node._proposal == "it"
-    said = ["closed", "no bench within 10 s: the approval has expired"]
+    said = ["closed", f"{idle or 'no bench'} within 10 s: the approval has expired"]
     assert node.calls == (said if expires else [])
 
 

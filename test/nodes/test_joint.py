@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from contextlib import contextmanager
 from pathlib import Path
 from types import SimpleNamespace
@@ -17,7 +18,7 @@ from rsea_ros.nodes._health import ERROR, OK, WARN, NodeHealth
 from rsea_ros.nodes._joint import DrivenJoint, _hardware, stop
 from rsea_ros.nodes._run import PROFILE
 from rsea_ros.nodes.joint import compose
-from test.nodes.conftest import QUICK, ROOT, as_argument
+from test.nodes.conftest import QUICK, ROOT, as_argument, setting
 from test.nodes.torque_loop import GAINS, Loop
 
 LARGEST = 250e6
@@ -98,6 +99,22 @@ def test_a_limit_of_the_controller_goes_down_under_torque_and_up_without(joint, 
     joint.hold(6.0, lambda: torque(joint) == 5.0)
 
 
+def test_a_stop_is_heard_while_gains_are_designed(joint, put, listener):
+    """It was answered after the design, 2.8 to 3.5 s late: that had the executor of both nodes."""
+    assert put("/rsea/controller", k_p=GAINS["k_p"], k_i=GAINS["k_i"]) == ""
+    for service in ("stop", "clear_fault"):  # answers to clients that a node has not found yet are lost
+        assert listener.call(f"/rsea/driver/{service}").success
+    every = setting(**dict.fromkeys(GAINS, -1.0))
+    designed = listener.clients["/rsea/controller/set_parameters_atomically"].call_async(every)
+    for _ in range(2):
+        begun = time.monotonic()
+        assert listener.call("/rsea/driver/stop").success
+        assert time.monotonic() - begun < 0.5 and not designed.done()
+    listener.until(designed.done)
+    assert designed.result().result.successful
+    assert listener.call("/rsea/driver/clear_fault").success
+
+
 def test_the_tolerance_of_the_flag_changes_while_it_is_up(joint, put):
     def told():
         status = [s for message in joint.health for s in message.status if s.name == "/rsea/model"][-1]
@@ -113,6 +130,20 @@ def test_one_signal_ends_all_of_them_at_zero_torque(joint, listener):
     listener.until(lambda: joint.process.poll() is not None)
     assert joint.process.returncode == 0
     listener.until(lambda: torque(joint) == 0.0)
+
+
+def test_a_driver_is_made_last_in_whatever_order_they_are_named():
+    """Named after the controller it was active while that designed its gains, and heard no stop."""
+    words = [w for key, value in GIVEN.items() for w in ("-p", f"{key}:={as_argument(value)}")]
+    command = [sys.executable, "-m", "rsea_ros.nodes.joint", "controller", "driver", "--ros-args", *words]
+    made = subprocess.Popen(command, env={**os.environ, "PYTHONPATH": str(ROOT)}, stderr=subprocess.PIPE)
+    told = []
+    while len(told) < 2:
+        line = made.stderr.readline()
+        told += [word for word in (b"tolerated: ", b"limits: ") if word in line]
+    made.send_signal(signal.SIGINT)
+    assert made.communicate() and made.returncode == 0
+    assert told == [b"tolerated: ", b"limits: "]
 
 
 def test_nodes_are_made_in_a_process_and_executor_of_ones_own(listener):

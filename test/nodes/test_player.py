@@ -8,9 +8,9 @@ import pytest
 
 from msg_adapters.ros import ERROR, OK, WARN, JointState, stamp_of
 from rsea_ros.errors import DeviceError
-from rsea_ros.nodes import _player, excite as module
-from rsea_ros.nodes._player import BenchEars, LiveRun, Player, check_followed
-from rsea_ros.nodes.excite import PATIENCE, BenchStatus, ExciteNode, plan
+from rsea_ros.nodes import _player
+from rsea_ros.nodes._player import PATIENCE, BenchEars, BenchStatus, LiveRun, Player, check_followed
+from rsea_ros.nodes.excite import ExciteNode, plan
 from rsea_ros.records.record import Channel, Fault, Record
 
 MS = 1_000_000
@@ -46,8 +46,16 @@ def node(monkeypatch):
     return Node()
 
 
-def player(node, command, *, lead=0.02, **options):
-    made = Player(node, np.array(command, float), 100.0, lead=lead, wanted=1, joint="hip", **options)
+def player(node, command, *, lead=0.02, ready=True, zero_first=lambda: False):
+    class Bench:
+        """Of a bench's status what a player asks."""
+
+        zero_first = property(lambda self: zero_first())
+
+        def ready(self):
+            return ready
+
+    made = Player(node, np.array(command, float), 100.0, Bench(), lead=lead, wanted=1, joint="hip")
     made.cycle = SimpleNamespace(
         start=lambda at: node.gone.append(at), stop=lambda: None, is_running=lambda: True, error=None
     )
@@ -83,7 +91,7 @@ def test_a_driver_that_wants_to_see_a_rest_hears_a_zero_and_then_nothing_for_a_s
 
 @pytest.mark.parametrize("why", ["nobody listens", "not ready", "stopped"])
 def test_it_does_not_begin(node, why):
-    made = player(node, [1.0], ready=lambda: why != "not ready")
+    made = player(node, [1.0], ready=why != "not ready")
     if why == "nobody listens":
         made._wanted = 2
     if why == "stopped":
@@ -185,6 +193,7 @@ class Run:
         self.player = SimpleNamespace(
             command=np.zeros(count), rate=100.0, started=True, left_out=0, over=lambda: self.is_over,
             stop=lambda: setattr(self, "stops", self.stops + 1), close=lambda: self.closed.append("player"),
+            rests=False, bench=SimpleNamespace(fault=""),
         )  # fmt: skip
         self.is_over, self.run = False, LiveRun(self.ears, self.player)
 
@@ -220,6 +229,12 @@ def test_a_run_ends_at_silence_and_at_the_first_failure_of_its_bench(monkeypatch
     waiting.now = 107.0
     waiting.alarm("driver: too hot")
     assert waiting.run.waits() == 7.0 and not waiting.run.over() and not waiting.stops
+    waiting.player.rests = True
+    assert waiting.run.waits() == 0.0
+    waiting.player.bench.fault, waiting.is_over = "driver has latched a fault", True
+    assert waiting.run.over() and waiting.stops == 1
+    with pytest.raises(DeviceError, match="driver has latched a fault"):
+        waiting.run.record()
     waiting.player.started = True
     assert waiting.run.waits() == 0.0
 
@@ -263,8 +278,8 @@ def test_a_run_whose_commands_did_not_act_as_planned_counts_for_nothing(monkeypa
 def bench(monkeypatch):
     """Return the status of a bench of two publishers, a clock, and what hears it."""
     now, heard, gone = [100.0], {}, []
-    monkeypatch.setattr(module.time, "monotonic", lambda: now[0])
-    monkeypatch.setattr(module, "publishers_of", lambda node, topic: {"/rsea/driver", "/rsea/plant"})
+    monkeypatch.setattr(_player.time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(_player, "publishers_of", lambda node, topic: {"/rsea/driver", "/rsea/plant"})
     node = SimpleNamespace(
         create_subscription=lambda kind, topic, take, qos: heard.update({topic: take}) or topic,
         destroy_subscription=gone.append,

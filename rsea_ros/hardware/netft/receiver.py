@@ -15,8 +15,8 @@ SO_TIMESTAMPNS = 35
 """Linux: the kernel stamps a datagram on arrival, however late the thread comes to fetch it."""
 _STAMP = struct.Struct("@qq")
 ANCILLARY = socket.CMSG_SPACE(_STAMP.size)
-PAUSE = 0.01
-"""s between two looks of the thread; the kernel keeps 70 records meanwhile at 7 kHz, and holds 256."""
+PAUSE, HELD = 0.01, 256
+"""s between two looks of the thread; records that the kernel holds. A drain that takes more may never end."""
 ASK_AGAIN = 0.2
 """s of silence after which the stream is asked for again."""
 KEPT = 4096
@@ -121,7 +121,7 @@ class DatagramReceiver:
             return
         try:
             with contextlib.suppress(OSError):  # no more records, or the sensor is off
-                while True:
+                for _ in range(HELD):
                     self._keep(*self._socket.recvmsg(SIZE_AND_MORE, ANCILLARY, socket.MSG_DONTWAIT))
         finally:
             self._draining.release()
