@@ -59,7 +59,11 @@ class Driven:
         self.push(self._driving, mend=self._activate)
 
     def _activate(self):
-        if self.value("active") == "False":
+        """Also configure one whose bench stood still while it was opened: it says nothing of being active."""
+        status = newest_status(self.health, f"/{self.name}/driver")
+        if status is not None and value_in(status, "active") is None:
+            self.change(Transition.TRANSITION_CONFIGURE)
+        elif value_in(status, "active") == "False":
             self.change(Transition.TRANSITION_ACTIVATE)
 
     def _driving(self):

@@ -45,7 +45,7 @@ def rigs(tmp_path_factory):
 @pytest.fixture(scope="module")
 def loop(start, listener, rigs):
     """Plant and controller that run."""
-    topics = Loop(listener)
+    topics = Loop(listener, stalls=("commands more than 1 sample late", "no usable measurement"))
     topics.encoder = Encoder(listener)
     moving, held = (rigs / f"{name}.yaml" for name in ("paper_moving_output", "paper_high_impedance"))
     start("plant", remaps={"deflection": "encoder"}, rig=moving, rate=RATE)
