@@ -70,7 +70,7 @@ class Virtual:
 
     def motor(self, model, **more):
         """Return the driver's end of a drive."""
-        usual = {"interface": "virtual", "latency": 0.2}
+        usual = {"interface": "virtual", "latency": 2.0}  # what a stall of its thread does not reach
         self.motors.append(MitMotor(CanConnection(self.channel, model, **(usual | more))))
         return self.motors[-1]
 

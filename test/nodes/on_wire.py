@@ -29,7 +29,10 @@ class Driven:
     def __init__(self, bench, listener, name, begin, parameters=PATIENT):
         self.bench, self.name, self._listener = bench, name, listener
         self._commands = listener.node.create_publisher(JointState, f"/{name}/torque_command", COMMAND)
-        self._clear = listener.node.create_client(Trigger, f"/{name}/driver/clear_fault")
+        ways = "clear_fault", "reboot"
+        self._clear, self._reboot = (
+            listener.node.create_client(Trigger, f"/{name}/driver/{way}") for way in ways
+        )
         self.health = listener.hear(DiagnosticArray, "/diagnostics", COMMAND)
         self.cleared = []
         self.process = begin("driver", remaps={"__ns": f"/{name}"}, **bench.parameters(), **parameters)
@@ -52,7 +55,8 @@ class Driven:
         fault = self.value("fault")
         if is_stall(fault):
             self.cleared.append(fault)
-            self._clear.call_async(Trigger.Request())
+            way = self._reboot if fault.startswith("hardware_error") else self._clear
+            way.call_async(Trigger.Request())
 
     def drive(self):
         """Wait until the motor has its torque; activate what a busy machine has kept from being activated."""
