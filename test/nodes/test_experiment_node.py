@@ -64,7 +64,7 @@ def session(bench, start, listener, tmp_path):
         plants.append(plant)
         listener.until(waits)
         assert node.is_running(), node.output
-        return SimpleNamespace(plant=plant, node=node, out=out, commands=commands)
+        return SimpleNamespace(plants=plants, node=node, out=out, commands=commands)
 
     yield begin
     for plant in plants:
@@ -108,17 +108,16 @@ def test_an_approval_expires_without_a_bench_and_a_run_can_be_cancelled_at_any_s
     """An approved run waited without limit, and began when a driver appeared. A broken one is not kept."""
 
     def expire(asked):
-        asked.plant.kill()
+        asked.plants[-1].kill()
         assert ask("approve").success
         listener.until(lambda: any("approval has expired" in line for line in asked.node.output))
-        asked.plant = start("plant", rig=bench / "bench.yaml")
+        asked.plants.append(start("plant", rig=bench / "bench.yaml"))
         states = listener.hear(JointState, "/rsea/joint_states", MEASUREMENT)
         listener.until(lambda: len(states) > 100)
 
     playing = approved(is_playing, expire, approval=0.3, longest=2.5, shortest=2.5)
     assert ask("cancel").success
     listener.until(lambda: not playing.node.is_running())
-    playing.plant.kill()
     assert playing.node.wait() == 0, playing.node.output
     efforts = np.array([m.effort[0] for m in playing.commands])
     ends = np.flatnonzero(efforts)[-1]
