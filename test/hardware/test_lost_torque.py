@@ -119,7 +119,7 @@ def kill(drivers, first=lambda: None):
 
 def test_a_supervisor_service_zeroes_the_torque_when_a_whole_process_group_is_killed(benches, service):
     """Driver, its children and its session are killed at once, as by a service manager or a container."""
-    each = [benches(model) for model in (54024, "CyberGear")]
+    each = [benches(model) for model in (54024, "AK10-9")]
     for bench in each:
         well_behaved(bench)
     kill([(bench, command(bench, service)) for bench in each])

@@ -33,7 +33,7 @@ class Encoder:
 
 @pytest.fixture(scope="module")
 def loop(start, listener, tmp_path_factory):
-    """Plant and controller that run, of one rig: of a free load said to be held ft jumps beside the spring."""
+    """Plant and controller of one rig: ft jumps beside the spring of a free load that is said to be held."""
     rig, path = load_rig("paper_high_impedance"), tmp_path_factory.mktemp("rig") / "held.yaml"
     save_rig(replace(rig, sensors={**rig.sensors, "deflection": Sensor(noise=5e-6)}), path)
     topics = Loop(listener, stalls=("commands more than 1 sample late", "no usable measurement"))

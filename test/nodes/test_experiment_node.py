@@ -146,13 +146,6 @@ def test_excite_plays_the_file_of_a_run(tmp_path):
     assert played == pytest.approx(command, abs=1e-8) and rate == pytest.approx(RATE)
 
 
-def test_an_interrupt_in_the_middle_of_a_run_commands_zero_and_keeps_nothing(approved, listener):
-    playing = approved(is_playing, longest=2.5, shortest=2.5)
-    assert playing.node.stop() == 130, playing.node.output
-    listener.until(lambda: playing.commands[-1].effort[0] == 0.0)
-    assert not list(playing.out.glob("run-*.mcap"))
-
-
 def test_a_run_confirms_the_cause(approved):
     first = approved(lambda asked: False, longest=2.0)
     assert first.node.wait() == 0, first.node.output
