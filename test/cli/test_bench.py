@@ -25,6 +25,7 @@ from rsea_ros.experiment.campaign import Campaign
 from rsea_ros.experiment.proposal import DesignRequest
 from rsea_ros.hardware.peer.remote import RemoteBench
 from rsea_ros.model.rig_file import load_rig, rig_folders
+from test.nodes.warm import Bench
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -52,15 +53,14 @@ def test_it_prints_its_addresses_and_a_signal_removes_the_port(tmp_path):
     assert not (tmp_path / "tty").is_symlink()
 
 
-def test_drives_on_can_are_behind_an_adapter_and_the_launch_names_them(tmp_path):
-    with RemoteBench(tmp_path / "tty", "--can", "RS03", "DM8009") as bench:
+def test_drives_on_can_are_behind_an_adapter_and_the_launch_names_them(tmp_path, refused):
+    with Bench(tmp_path / "tty", "--can", "RS03", "DM8009") as bench:
         given, (driver, *_) = bench.parameters(), node_calls("hardware", shlex.split(bench.launch)[3:])
         assert bench.torque(1) == (0, False)
     for name, value in {"device": "mit_can", "can_model": "RS03", "can_interface": "slcan"}.items():
         assert given[name] == driver.parameters[name] == value
-    process = start("--port", tmp_path / "tty", "--can", "RS03", "--deflection")
-    _, errors = process.communicate(timeout=30)
-    assert process.returncode == 2 and "no drive reads an encoder" in errors
+    line = refused("bench", "--port", tmp_path / "tty", "--can", "RS03", "--deflection")
+    assert "no drive reads an encoder" in line
 
 
 def test_with_an_encoder_on_the_spring_there_is_no_ft_sensor(tmp_path):

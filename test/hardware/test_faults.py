@@ -18,7 +18,7 @@ def torques(bench, since):
 
 
 @pytest.mark.parametrize(
-    ("loop", "bits"), [(54024, 0x20), (2020, 0x20), ("DM8009", 14), ("RS03", 0x10)], indirect=["loop"]
+    ("loop", "bits"), [(54024, 0x20), ("DM8009", 14), ("RS03", 0x10)], indirect=["loop"]
 )
 def test_a_hardware_error_needs_a_reboot_and_is_over_after_it(loop, bits):
     since = loop.bench.ask("alert", bits=bits)["t"]

@@ -18,7 +18,6 @@ from test.nodes.stalls import is_stall
 OTHER = {
     "another number": (("set", {"number": 5}), ("set", {"number": 0x1122334455667788}), "number 05000"),
     "another range": (("set", {"v": 30.0}), ("set", {"v": 45.0}), "range of velocity ±30, expected ±45"),
-    "another limit": (("set", {"torque_limit": 17.0}), ("set", {"torque_limit": 60.0}), "torque_limit 17"),
     "another model": (("model", {"number": 54025}), ("model", {"number": 54024}), "model 54025"),
     "another current limit": (("set", {"torque_limit": 100}), ("set", {"torque_limit": 620}), "current 1.6"),
 }
@@ -27,9 +26,8 @@ OTHER = {
 @pytest.mark.parametrize(
     ("loop", "name", "service"),
     [
-        (54024, "another model", "clear"), (54024, "another current limit", "reboot"),
-        (54024, "another current limit", "enable"), ("RS03", "another number", "clear"),
-        ("RS03", "another limit", "enable"), ("DM8009", "another range", "reboot"),
+        (54024, "another model", "clear"), (54024, "another current limit", "enable"),
+        ("RS03", "another number", "clear"), ("DM8009", "another range", "reboot"),
     ],
     indirect=["loop"],
 )  # fmt: skip

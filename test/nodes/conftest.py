@@ -137,7 +137,7 @@ class Listener:
         self.executor.remove_node(node)
         node.destroy_node()
 
-    def until(self, condition, act=lambda: None, mend=lambda: None, pause=1.5):
+    def until(self, condition, act=lambda: None, mend=lambda: None, pause=0.6):
         """Spin until the condition holds, and return what it returned.
 
         act: done before each look, such as to command. mend: done once in `pause` s, such as to clear what a

@@ -29,7 +29,10 @@ class Driven:
     def __init__(self, bench, listener, name, begin, parameters=PATIENT):
         self.bench, self.name, self._listener = bench, name, listener
         self._commands = listener.node.create_publisher(JointState, f"/{name}/torque_command", COMMAND)
-        self._clear = listener.node.create_client(Trigger, f"/{name}/driver/clear_fault")
+        ways = "clear_fault", "reboot"
+        self._clear, self._reboot = (
+            listener.node.create_client(Trigger, f"/{name}/driver/{way}") for way in ways
+        )
         self.health = listener.hear(DiagnosticArray, "/diagnostics", COMMAND)
         self.cleared = []
         self.process = begin("driver", remaps={"__ns": f"/{name}"}, **bench.parameters(), **parameters)
@@ -52,14 +55,19 @@ class Driven:
         fault = self.value("fault")
         if is_stall(fault):
             self.cleared.append(fault)
-            self._clear.call_async(Trigger.Request())
+            way = self._reboot if fault.startswith("hardware_error") else self._clear
+            way.call_async(Trigger.Request())
 
     def drive(self):
         """Wait until the motor has its torque; activate what a busy machine has kept from being activated."""
         self.push(self._driving, mend=self._activate)
 
     def _activate(self):
-        if self.value("active") == "False":
+        """Also configure one whose bench stood still while it was opened: it says nothing of being active."""
+        status = newest_status(self.health, f"/{self.name}/driver")
+        if status is not None and value_in(status, "active") is None:
+            self.change(Transition.TRANSITION_CONFIGURE)
+        elif value_in(status, "active") == "False":
             self.change(Transition.TRANSITION_ACTIVATE)
 
     def _driving(self):

@@ -4,10 +4,12 @@ import time
 
 STALLS = (
     "no_reply", "heldup", "ft", "effort", "deflection", "velocity", "power",
-    "motor_state: bus_watchdog is -1", "refused",
+    "motor_state: bus_watchdog is -1", "motor_state: state is reset", "hardware_error: communication lost",
+    "refused",
 )  # fmt: skip
 """Beginnings of the texts of such faults; no test that clears them provokes one. A motor whose watchdog has
-ended its torque refuses each goal: which of the two is told first is chance."""
+ended its torque refuses each goal: which of the two is told first is chance. A drive on CAN tells of its own
+watchdog as a state (RS03), or as an error of which a reboot alone is the end (DM8009)."""
 
 
 def is_stall(fault):

@@ -54,7 +54,7 @@ class Wire:
     def hold(self, torque, condition):
         """Request a torque until a condition holds; clear faults from stalls of the machine."""
         command = lambda: self.desired.publish(torque_command_message(time.time_ns(), torque))  # noqa: E731
-        self.listener.until(condition, command, self.clear_latched, 2.0)
+        self.listener.until(condition, command, self.clear_latched)
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,6 @@ from msg_adapters.ros import JointState, WrenchStamped
 from rsea_ros.hardware.dynamixel.control_tables import TABLES
 from rsea_ros.nodes._qos import COMMAND, MEASUREMENT
 from test.nodes.on_wire import Driven, newest_status
-from test.nodes.stalls import is_stall
 from test.nodes.warm import Bench
 
 
@@ -79,12 +78,6 @@ def test_zero_ft_is_refused_under_torque_and_takes_the_offset_away_without(wire,
     assert wire.trigger("clear_fault").success
 
 
-def _excite(start, **values):
-    """Begin an excitation of the bench, by default for longer than any test."""
-    usual = {"amplitude": 3.0, "noise": 0.0, "duration": 200.0, "rate": 100.0}
-    return start("excite", remaps={"__ns": "/main"}, **(usual | values))
-
-
 def test_a_fault_is_published_keeps_excite_away_and_ends_by_service(wire, listener, start):
     """It played to the end, and the recording showed a machine that never moved."""
     told = "temperature: 90 °C, limit 70 °C"
@@ -92,7 +85,7 @@ def test_a_fault_is_published_keeps_excite_away_and_ends_by_service(wire, listen
     wire.bench.ask("set", temperature=90)
     wire.push(lambda: wire.goal() == (0, True) and wire.value("fault") == told)
     commands = listener.hear(JointState, "/main/torque_command", COMMAND)
-    excite = _excite(start)
+    excite = start("excite", remaps={"__ns": "/main"}, amplitude=3.0, noise=0.0, duration=200.0, rate=100.0)
     listener.until(lambda: not excite.is_running())
     assert excite.wait() == 2 and told in excite.output[-1]
     assert excite.output[-1].endswith("rsea call /main/driver clear_fault")
@@ -103,33 +96,6 @@ def test_a_fault_is_published_keeps_excite_away_and_ends_by_service(wire, listen
     assert wire.trigger("clear_fault").success
     assert wire.change(Transition.TRANSITION_ACTIVATE).success
     wire.drive()
-
-
-def test_excite_keeps_the_limit_that_its_driver_derives(wire, start):
-    """Its own was 68 N·m whatever the motor."""
-    for _ in range(4):
-        wire.drive()
-        excite = _excite(start, limit=100.0, amplitude=75.0, duration=9.0)
-        assert excite.wait() == 2
-        if not is_stall(excite.output[-1].split("has latched a fault, ")[-1]):
-            break
-    assert "largest command 75 N·m, expected at most torque_limit = 68 N·m" in excite.output[-1]
-
-
-def test_excite_waits_for_an_active_driver_and_stops_at_a_fault(wire, listener, start):
-    wire.drive()
-    assert wire.change(Transition.TRANSITION_DEACTIVATE).success
-    excite = _excite(start)
-    listener.until(lambda: any("is not active; rsea call /main/driver activate" in x for x in excite.output))
-    commands = listener.hear(JointState, "/main/torque_command", COMMAND)
-    assert not commands and wire.change(Transition.TRANSITION_ACTIVATE).success
-    listener.until(lambda: sum(message.effort[0] != 0.0 for message in commands) > 50)
-    assert wire.trigger("stop").success
-    listener.until(lambda: not excite.is_running())
-    told = excite.output[-1].split("has latched a fault, ")[-1]
-    assert excite.wait() == 2 and (told.startswith("stopped") or is_stall(told)), excite.output[-1]
-    assert commands[-1].effort[0] == 0.0
-    assert wire.trigger("clear_fault").success
 
 
 LISTENER = (

@@ -18,7 +18,7 @@ def test_the_committed_policies_are_those_of_the_nodes(tmp_path):
     files = os.devnull, tmp_path / "policies.xml", tmp_path / "said"
     for file in files[1:]:
         file.touch()
-    made = parent().start("rsea_ros.nodes._policies", [], {**os.environ, "PYTHONPATH": str(ROOT)}, files)
+    made = parent().start("quick_policies", [], {**os.environ, "PYTHONPATH": str(ROOT)}, files)
     assert made.wait(60.0) == 0, files[2].read_text()
     assert FILE.read_bytes() == files[1].read_bytes(), "python -m rsea_ros.nodes._policies makes it anew"
 

@@ -26,6 +26,8 @@ LEAD = 0.2
 """s by which desired torques are sent ahead."""
 RISE = 0.25
 """s, in which a sine grows to its amplitude."""
+STALLS = "commands more than 1 sample late", "no usable measurement"
+"""Of the faults that a machine that stalls makes the controller latch."""
 SETTLED = 1.0
 """s after its begin from which on it counts."""
 
@@ -36,7 +38,7 @@ class Loop:
     A listener that the machine holds up for a second hears the few pulses of a command none the less.
     """
 
-    def __init__(self, listener, namespace="/rsea", stalls=("commands more than 1 sample late",)):
+    def __init__(self, listener, namespace="/rsea", stalls=STALLS):
         self.listener, self._namespace, self._stalls = listener, namespace, stalls
         self.states = listener.hear(JointState, f"{namespace}/joint_states", MEASUREMENT)
         self.wrenches = listener.hear(WrenchStamped, f"{namespace}/ft", MEASUREMENT)

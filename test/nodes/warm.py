@@ -133,7 +133,7 @@ def serve(folder: Path) -> None:
     signal.signal(signal.SIGCHLD, reap)
     for line in sys.stdin:
         wish = json.loads(line)
-        if wish["module"].startswith(("rsea_ros.nodes.", "rsea_extras.watch.")):
+        if wish["module"].startswith(("rsea_ros.nodes.", "rsea_extras.watch.", "quick_")):
             prepare()
         signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGCHLD])
         pid = os.fork()
