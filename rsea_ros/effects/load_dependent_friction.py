@@ -29,12 +29,7 @@ EFFECT = Effect(
         ),
         PRESLIDING,
     ),
-    claims=Claims(
-        "velocity",
-        "odd",
-        amplitude_exponent=1.0,
-        passive=True,
-    ),
+    claims=Claims("velocity", "odd", amplitude_exponent=1.0, passive=True),
     function=apply,
     states=1,
     reads=(GEAR_VELOCITY, LOAD),

@@ -94,12 +94,7 @@ EFFECT = Effect(
             reason="Dahl's 0, Bouc's 1/2, and springs that harden (Ismail), up to where z never ends",
         ),
     ),
-    claims=Claims(
-        "velocity",
-        "odd",
-        amplitude_exponent=None,
-        passive=True,
-    ),
+    claims=Claims("velocity", "odd", amplitude_exponent=None, passive=True),
     function=apply,
     states=3,
     reads=(DEFLECTION,),
