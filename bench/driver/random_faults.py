@@ -41,6 +41,7 @@ class Watched:
         self.bench, self.loop, self.dice = bench, Loop(bench), random.Random(seed)
         self.commanded = self.since = 0
         self.silent = 0
+        self.displaced = False
         self.violations: list[str] = []
         self.excused: list[str] = []
         self.happened: deque[str] = deque(maxlen=6)
@@ -141,6 +142,12 @@ class Watched:
     def _recover(self) -> None:
         self._misbehave()
         self.bench.ask("set", temperature=30, voltage=240, torque_limit=620, homing_offset=0)
+        guarded, is_served = self.loop.guarded, self.service is not None and self.service.is_alive()
+        if self.displaced and not is_served:  # a jump of which one way was seen ends by configure alone
+            guarded.disable()
+            guarded.device.close()
+            guarded.open()
+            self.displaced = False
         self._call("clear", "reboot", "clear", "enable")
 
     def _call(self, *services: str) -> None:
@@ -155,9 +162,11 @@ class Watched:
             if name == "reboot" and len(services) > 1 and guarded.fault is None:
                 continue
             asked = time.monotonic_ns()
-            with suppress(DeviceError):
+            try:
                 if getattr(guarded, name)() is not False and name == "clear":
                     self.cleared = max(self.cleared, asked)
+            except DeviceError as error:
+                self.displaced = self.displaced or "expected cleanup and configure" in str(error)
 
 
 def random_faults(folder: Path, *, minutes: float = 1.0, seed: int = 1) -> list[tuple[str, str, str]]:
