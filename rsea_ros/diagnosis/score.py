@@ -82,11 +82,13 @@ def lost_above(case: Case, channel: str) -> float | None:
     coherence = cross / np.maximum(power * power_density(y, rate, length)[1], 1e-300)
     is_excited = (power > 1e-3 * np.median(power)) & (frequency > _LOWEST)
     is_lost, frequency = (coherence < _LOST)[is_excited], frequency[is_excited]
-    count = np.arange(1, len(is_lost) + 1)
-    above = np.cumsum(is_lost[::-1])[::-1] / count[::-1]
-    below = (np.cumsum(is_lost) - is_lost) / count
-    edges = np.flatnonzero(is_lost & (above >= _MOST) & (below <= 1.0 - _MOST))
-    return float(frequency[edges[0]]) if len(edges) and 0 < edges[0] < _MOST * len(frequency) else None
+    if not len(is_lost):
+        return None
+    before: IntArray = np.cumsum(is_lost) - is_lost
+    heard = np.cumsum(~is_lost[::-1])[::-1]
+    edge, count = int(np.argmin(before + heard)), len(is_lost)
+    is_step = heard[edge] <= (1.0 - _MOST) * (count - edge) and before[edge] <= (1.0 - _MOST) * edge
+    return float(frequency[edge]) if is_step and 0 < edge < _MOST * count else None
 
 
 def _segments(blocks: IntArray, good: BoolArray) -> list[IntArray]:

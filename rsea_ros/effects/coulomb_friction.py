@@ -36,10 +36,7 @@ EFFECT = Effect(
         PRESLIDING,
     ),
     claims=Claims(
-        "velocity",
-        "odd",
-        amplitude_exponent=0.0,
-        passive=True,
+        "velocity", "odd", amplitude_exponent=0.0, passive=True,
         confusable_with=("stribeck_friction", "spring_hysteresis"),
     ),
     function=apply,

@@ -46,10 +46,7 @@ EFFECT = Effect(
         PRESLIDING,
     ),
     claims=Claims(
-        "velocity",
-        "odd",
-        amplitude_exponent=1.0,
-        passive=True,
+        "velocity", "odd", amplitude_exponent=1.0, passive=True,
         confusable_with=("load_dependent_friction",),
     ),
     function=apply,

@@ -64,10 +64,7 @@ EFFECT = Effect(
         ),
     ),
     claims=Claims(
-        "velocity",
-        "odd",
-        amplitude_exponent=1.0,
-        passive=True,
+        "velocity", "odd", amplitude_exponent=1.0, passive=True,
         confusable_with=("command_delay", "current_loop_lag"),
     ),
     structure=change,

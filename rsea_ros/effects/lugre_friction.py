@@ -58,10 +58,7 @@ EFFECT = Effect(
         ),
     ),
     claims=Claims(
-        "velocity",
-        "odd",
-        amplitude_exponent=None,
-        passive=True,
+        "velocity", "odd", amplitude_exponent=None, passive=True,
         confusable_with=("coulomb_friction", "stribeck_friction", "spring_hysteresis"),
     ),
     function=apply,

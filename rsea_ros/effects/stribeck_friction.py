@@ -48,10 +48,7 @@ EFFECT = Effect(
         PRESLIDING,
     ),
     claims=Claims(
-        "velocity",
-        "odd",
-        amplitude_exponent=None,
-        passive=True,
+        "velocity", "odd", amplitude_exponent=None, passive=True,
         confusable_with=("coulomb_friction", "spring_hysteresis"),
     ),
     function=apply,
