@@ -39,9 +39,14 @@ class Driven:
 
     def push(self, condition, torque=10.0, mend=lambda: None):
         """Command a torque until the condition holds; clear what a busy machine has latched."""
-        self._listener.until(
-            condition, lambda: self.publish(torque), lambda: (self._clear_stall(), mend())
-        )
+        try:
+            self._listener.until(
+                condition, lambda: self.publish(torque), lambda: (self._clear_stall(), mend())
+            )
+        except AssertionError as vain:
+            heard, known = self._commands.get_subscription_count(), ("active", "fault", "torque_limit")
+            status = {key: self.value(key) for key in known}
+            raise AssertionError(f"{vain}\n{self.name}: {heard} hear it, {status}, {self.goal()}") from None
 
     def publish(self, torque):
         """Publish a command."""
