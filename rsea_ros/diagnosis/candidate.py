@@ -160,8 +160,14 @@ class Candidate:
 
     @property
     def parameters(self) -> int:
-        """How many unknowns the model has, to be paid for."""
-        return paid_for(self.problem)
+        """How many unknowns the model has, without shares that only bound the form of a law."""
+        free = {
+            f"{name}.{p.name}"
+            for name in self.problem.acting
+            for p in effect_named(name).parameters
+            if p.is_share and not p.is_counted
+        }
+        return sum(u.name not in free for u in self.problem.unknowns)
 
     @property
     def prior_cost(self) -> float:
@@ -300,17 +306,6 @@ def leaves_only_noise(model: Candidate, limit: float) -> bool:
 def effect_size(name: str) -> int:
     """Return how many numbers describe an effect; some optional ones do not count."""
     return sum(p.is_counted for p in effect_named(name).parameters)
-
-
-def paid_for(problem: Problem) -> int:
-    """Return how many unknowns a problem has without shares that only bound the form of a law."""
-    free = {
-        f"{name}.{p.name}"
-        for name in problem.acting
-        for p in effect_named(name).parameters
-        if p.is_share and not p.is_counted
-    }
-    return sum(u.name not in free for u in problem.unknowns)
 
 
 def prior_cost(problem: Problem, theta: FloatArray) -> float:

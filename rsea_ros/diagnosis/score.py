@@ -69,7 +69,7 @@ def missed_response(case: Case, output: FloatArray, channel: str, blocks: IntArr
 
 
 def lost_above(case: Case, channel: str) -> float | None:
-    """Return the frequency, Hz, above which a channel is mostly noise although the command excites it."""
+    """Return the frequency, Hz, of the best step above which an excited channel is mostly noise, or None."""
     if not isinstance(case.drive, Drive):
         return None
     t = case.t[channel]

@@ -160,32 +160,36 @@ def top_of_band(values: FloatArray, seams: Sequence[int] | IntArray = ()) -> tup
     seams: samples before which values are missing. A jump there would pass for noise.
     """
     spectra = unit_spectra(values, _LONGEST, _SEGMENTS)
-    power = np.mean(np.abs(spectra[_seamless(spectra, seams)]) ** 2, axis=0)
+    whole = _seamless(spectra, seams)
+    power = np.mean(np.abs(spectra[whole if whole.any() else slice(None)]) ** 2, axis=0)
     return math.sqrt(float(np.median(power[_top(power)]))), _is_flat(power)
 
 
-def _seamless(spectra: ComplexArray, seams: Sequence[int] | IntArray, fewest: int = 1) -> BoolArray:
-    """Return which of half-overlapping segments have no seam inside; all where too few have none."""
+def _seamless(spectra: ComplexArray, seams: Sequence[int] | IntArray) -> BoolArray:
+    """Return which of half-overlapping segments have no seam inside."""
     half = spectra.shape[1] - 1
     first = half * np.arange(len(spectra))
-    whole = np.searchsorted(seams, first, side="right") == np.searchsorted(seams, first + 2 * half)
-    return whole if np.count_nonzero(whole) >= fewest else np.ones(len(spectra), bool)
+    whole: BoolArray = np.searchsorted(seams, first, "right") == np.searchsorted(seams, first + 2 * half)
+    return whole
 
 
 def _unlike(command: Channel, t: FloatArray, y: FloatArray) -> FloatArray:
     """Return the power of a channel that does not follow the command linearly, by frequency.
 
-    From segments in which no sample is missing, shorter ones where it takes that.
+    From segments in which no sample is missing, shorter ones where it takes that, else from all.
     """
     steps = np.diff(t)
     period = float(np.median(steps))
     held = np.nan_to_num(command.held(t - 0.25 * period))
     seams = 1 + np.flatnonzero(steps > _MISSING * period)
-    for longest in (_LONGEST, _LONGEST // 4, _LONGEST // 16, _LONGEST):
+    for longest in (_LONGEST, _LONGEST // 4, _LONGEST // 16):
         u, v = (unit_spectra(values, longest, _SEGMENTS) for values in (held, y))
-        if not (whole := _seamless(v, seams, _SEGMENTS)).all() or not len(seams):
+        whole = _seamless(v, seams)
+        if np.count_nonzero(whole) >= _SEGMENTS:
+            u, v = u[whole], v[whole]
             break
-    u, v = u[whole], v[whole]
+    else:
+        u, v = (unit_spectra(values, _LONGEST, _SEGMENTS) for values in (held, y))
     power = np.mean(np.abs(v) ** 2, axis=0)
     shared = np.abs(np.mean(v * u.conj(), axis=0)) ** 2 / (np.mean(np.abs(u) ** 2, axis=0) + _TINY)
     return np.asarray(np.maximum(power - shared, 0.0) / (1.0 - 1.8 / max(2.0, len(v))))

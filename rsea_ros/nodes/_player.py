@@ -50,9 +50,10 @@ class BenchStatus:
     def fault(self) -> str:
         """What is wrong, in words; empty where nothing is known to be."""
         limit, who = self._most
+        if self._latched or not self.largest > limit:
+            return self._latched
         most = f"expected at most torque_limit = {limit:.4g} N·m of {who}"
-        above = f"largest command {self.largest:.4g} N·m, {most}" if self.largest > limit else ""
-        return self._latched or above
+        return f"largest command {self.largest:.4g} N·m, {most}"
 
     def ready(self) -> bool:
         """Return whether commands may begin."""

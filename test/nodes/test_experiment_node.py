@@ -158,6 +158,13 @@ def test_excite_plays_the_file_of_a_run(tmp_path):
     assert played == pytest.approx(command, abs=1e-8) and rate == pytest.approx(RATE)
 
 
+def test_an_interrupt_in_the_middle_of_a_run_commands_zero_and_keeps_nothing(approved, listener):
+    playing = approved(is_playing, longest=2.5, shortest=2.5)
+    assert playing.node.stop() == 130, playing.node.output
+    listener.until(lambda: playing.commands[-1].effort[0] == 0.0)
+    assert not list(playing.out.glob("run-*.mcap"))
+
+
 def test_a_driver_with_autostart_sees_a_rest_before_a_run(approved):
     """It latched `restarted` at the first torque, as it did for `excite`, and the session was over."""
     driven = {"device": "simulated", "autostart": True, "command_timeout": 1.0}
