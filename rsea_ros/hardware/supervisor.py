@@ -4,8 +4,8 @@ Run as a file of its own with nothing but the standard library:
 supervisor.py, with a Unix socket as stdin, gets {"timeout": S, "frames": [HEX, …], "replies": [HEX, …]} in a
 line, with the descriptor of the port, and then the driver's beats: `a` torque is on, `d` it is off, `q` all
 is well, end. End of input without `q` is the death of the driver, by whatever signal. Each beat is answered.
-Frames go out again until the motor has acknowledged each with a reply, where there are any; a motor that does
-not is reported to the system log.
+Frames go out again until the motor has acknowledged each with a reply, twice, where there are any; one that
+does not is reported to the system log.
 supervisor.py --listen SOCKET is the same as a service, for every driver that connects there, which survives
 anything that kills driver and children together (a control group, a container, a login).
 """
@@ -21,8 +21,9 @@ import syslog
 import threading
 import time
 
-REPEAT, SPACING = 20, 0.005
-"""How often the frames go out, and every how many s: one may collide with the motor's last answer."""
+REPEAT, SPACING, SURE = 20, 0.005, 2
+"""How often the frames go out, and every how many s: one may collide with the motor's last answer. Rounds
+that must be acknowledged: answers are alike, and that last one may pass for the answer to the first frame."""
 PATIENCE, HANG = 3.0, 0.1
 """s in which the motor of a dead driver, of one that hangs, may acknowledge them, as one that is booting."""
 
@@ -43,13 +44,13 @@ class Line:
         self._descriptor, self._frames, self._replies = descriptor, frames, replies
 
     def stop(self, again: int, patience: float = 0.0) -> bool:
-        """Send all frames some times, then for so many s, until each is acknowledged; return whether."""
-        end = time.monotonic() + patience
+        """Send all frames some times, then for so many s, until surely acknowledged; return whether."""
+        end, rounds = time.monotonic() + patience, 0
         while True:
             done = [self._send(frame) for frame in self._frames]
-            again -= 1
-            if all(done) or (again <= 0 and time.monotonic() > end):
-                return all(done)
+            again, rounds = again - 1, rounds + 1 if all(done) else 0
+            if rounds == SURE or (again <= 0 and time.monotonic() > end):
+                return rounds == SURE
 
     def _send(self, frame: bytes) -> bool:
         """Send a frame and wait for its answer; return whether it is acknowledged."""

@@ -8,6 +8,7 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
 from contextlib import suppress
 from pathlib import Path
 
@@ -66,6 +67,27 @@ def test_a_device_without_protection_is_refused_unless_that_is_allowed(toy):
     assert not device.opened, "nothing stays open"
     guard(device).open(unprotected=True)
     assert device.opened
+
+
+def test_the_answer_to_a_dead_drivers_last_frame_acknowledges_nothing():
+    """Answers are alike: one that was on its way was taken for the first frame's, which it collided with."""
+    ours, motors = socket.socketpair()
+    with ours, motors:
+        got = []
+
+        def motor():
+            motors.sendall(b"ok")
+            motors.recv(64)  # comes while it answers, and is lost
+            while data := motors.recv(64):
+                got.append(data)
+                motors.sendall(b"ok")
+
+        thread = threading.Thread(target=motor)
+        thread.start()
+        assert supervisor.Line(ours.fileno(), [b"goal", b"torque"], [b"ok"]).stop(supervisor.REPEAT, 1.0)
+        ours.shutdown(socket.SHUT_RDWR)
+        thread.join()
+    assert {b"goal", b"torque"} <= set(got)
 
 
 def test_a_supervised_toy_is_stopped_when_the_driver_hangs(toy):

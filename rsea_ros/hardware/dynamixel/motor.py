@@ -64,9 +64,8 @@ class Motor(BusMotor):
         if own is None:
             return Rating(math.nan)
         speed, supply = self.control_table.no_load_speed, (own.lowest_voltage, own.highest_voltage)
-        return Rating(
-            self.torque_of(own.current), speed, math.inf, own.current, *supply, self.control_table.count
-        )
+        torque, count = self.torque_of(own.current), self.control_table.count
+        return Rating(torque, speed, math.inf, own.current, *supply, count)
 
     def check(self, limits: Limits) -> None:
         """Compare the driver's limits with the motor's. Raises ParameterError."""
