@@ -44,9 +44,9 @@ class Driven:
                 condition, lambda: self.publish(torque), lambda: (self._clear_stall(), mend())
             )
         except AssertionError as vain:
-            heard, known = self._commands.get_subscription_count(), ("active", "fault", "torque_limit")
-            status = {key: self.value(key) for key in known}
-            raise AssertionError(f"{vain}\n{self.name}: {heard} hear it, {status}, {self.goal()}") from None
+            heard, status = self._commands.get_subscription_count(), self._newest()
+            said = {pair.key: pair.value for pair in status.values} if status else None
+            raise AssertionError(f"{vain}\n{self.name}: {heard} hear it, {self.goal()}, {said}") from None
 
     def publish(self, torque):
         """Publish a command."""
@@ -54,7 +54,10 @@ class Driven:
 
     def value(self, key):
         """The newest value that the driver's diagnostics have."""
-        return value_in(newest_status(self.health, f"/{self.name}/driver"), key)
+        return value_in(self._newest(), key)
+
+    def _newest(self):
+        return newest_status(self.health, f"/{self.name}/driver")
 
     def _clear_stall(self):
         fault = self.value("fault")
@@ -69,7 +72,7 @@ class Driven:
 
     def _activate(self):
         """Also configure one whose bench stood still while it was opened: it says nothing of being active."""
-        status = newest_status(self.health, f"/{self.name}/driver")
+        status = self._newest()
         if status is not None and value_in(status, "active") is None:
             self.change(Transition.TRANSITION_CONFIGURE)
         elif value_in(status, "active") == "False":
