@@ -307,13 +307,14 @@ def test_a_slow_command_decides_it_where_the_noise_lets_it():
     assert not behind_the_edge(noisy)[1]
 
 
-@pytest.mark.parametrize(("step", "expected"), [(10, INSIDE * H), (0.1, H / 10)])
-def test_a_faster_torque_moves_by_no_more_than_its_period(step, expected):
+@pytest.mark.parametrize("step", [10, 1, 0.2, 0.1])
+def test_a_torque_at_another_rate_still_shows_its_commands(step):
     t = np.arange(0.0, ROWS, step) * H
-    held = U[np.minimum(np.floor(t / H + 1e-6).astype(int), ROWS - 1)]
-    repaired, faults = behind_the_edge(driven(held, t=t))
+    shown = np.minimum(np.floor(t / H + 1e-6).astype(int), ROWS - 1)
+    repaired, faults = behind_the_edge(driven(U[shown], t=t))
     assert len(faults) == 1
-    assert repaired["motor_torque"].t[0] == pytest.approx(expected)
+    moved = repaired["motor_torque"].t
+    assert np.all((moved > T[shown]) & (moved < T[shown] + 0.99 * H))
 
 
 @pytest.mark.parametrize(("rate", "late"), [(100.0, 0.0), (280.0, 0.1), (280.0, 0.5), (2000.0, 0.9)])

@@ -245,7 +245,8 @@ def _is_new(values: FloatArray) -> BoolArray:
 NEAR = 0.25
 """Of the shorter period: a torque so close to the stamp of a command is read at its edge."""
 INSIDE = 0.6
-"""Of a command period: how far such a torque moves, past any step of a simulation that ends at the edge."""
+"""Of the shorter period: how far such a torque moves, past any step of a simulation that ends at the edge, and
+not across the next one."""
 _FEWEST_EDGES = 64
 """Samples at edges, to decide."""
 _BETTER = 0.8
@@ -262,7 +263,7 @@ def behind_the_edge(record: Record) -> tuple[Record, list[Fault]]:
     command, torque = record["command"], record["motor_torque"]
     if len(command) < _FEWEST_EDGES or len(torque) < _FEWEST_EDGES or not _began(command, torque):
         return record, []
-    late = min(INSIDE * _period(command), _period(torque))
+    late = INSIDE * min(_period(command), _period(torque))
     fault = Fault("early_torque", "motor_torque", 1.0, "each value is of the command with its stamp")
     return record.with_channels(motor_torque=Channel(torque.t + late, torque.y)), [fault]
 
