@@ -245,8 +245,8 @@ def _is_new(values: FloatArray) -> BoolArray:
 NEAR = 0.25
 """Of the shorter period: a torque so close to the stamp of a command is read at its edge."""
 INSIDE = 0.6
-"""Of the shorter period: how far such a torque moves, past any step of a simulation that ends at the edge, and
-not across the next one."""
+"""Of the shorter period: how far such a torque moves, past any step of a simulation that ends at the edge and
+not past the next one."""
 _FEWEST_EDGES = 64
 """Samples at edges, to decide."""
 _BETTER = 0.8

@@ -285,3 +285,19 @@ def test_a_recording_that_begins_before_the_first_command_fits_as_well(rest):
     run = simulate(RIG, np.concatenate([np.zeros(int(280 * rest)), torque]), rate=280.0, seed=3)
     run = run.with_channels(command=run["command"].between(rest - 1e-9, np.inf))
     assert max(identify([run], RIG).times_noise.values()) < 1.08
+
+
+@pytest.mark.parametrize("delay", [0, 3])
+@pytest.mark.parametrize("closed", [True, False])
+def test_the_noise_that_a_loop_brings_back_is_its_sensors(closed, delay):
+    """Above what the reference asks, the command of a loop holds nothing but the noise of its sensor."""
+    rng = np.random.default_rng(4)
+    n, h = 8192, 0.002
+    slow, noise = np.sin(2.0 * np.pi * 0.7 * h * np.arange(n)), rng.normal(size=n)
+    wide = lfilter([0.1], [1.0, -0.9], rng.normal(size=n)) * 20.0
+    y, u, x = np.zeros(n), np.zeros(n), 0.0
+    for k in range(n):
+        y[k] = x + noise[k]
+        u[k] = 0.1 * (50.0 * slow[k - delay] - y[k - delay]) if closed else 0.1 * wide[k]
+        x = 0.98 * x + 0.05 * u[k]
+    assert noise_floor(record(y, u, 1.0 / h, 1.0 / h), "ft", Sensor(1.0)) == pytest.approx(1.0, rel=0.03)
