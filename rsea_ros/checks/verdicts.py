@@ -57,7 +57,9 @@ _HOLDS = 4.0
 _FAR, _MOVED, _ELSEWHERE = 4.0, 1.6, 3.0
 """Factor of a rig's value that is another machine's; that is worth a look; and spreads that go with both."""
 _SAME_RATE, _FLAT = 0.15, 0.07
-"""Logarithm and share left: a factor between two kinematic channels that is the same at all frequencies."""
+"""Logarithm and share left: a factor between two channels that is the same at all frequencies."""
+_LINEAR = 0.998
+"""Coherence, by power, of a torque in proportion to its command: one that was limited a little has less."""
 _WHOLE = 0.9
 """Coherence, by power, of a channel that is only turned or in another unit: a wrapped code has less."""
 _MEASURED, _OF_ONE = 0.2, 0.7
@@ -420,11 +422,15 @@ def _contradiction(p: Pair) -> Finding:
 
 
 def _is_off(p: Pair) -> bool:
-    """Return whether two kinematic channels disagree by a factor, at all frequencies alike."""
-    if (p.law.y, p.law.x) not in _SAYS or p.law.y not in MEASURED or p.law.y == "motor_torque" or not p.sign:
+    """Return whether two channels of one quantity disagree by a factor, at all frequencies alike.
+
+    A drive at its limit gives less than it was asked for, but not in proportion.
+    """
+    if (p.law.y, p.law.x) not in _SAYS or p.law.y not in MEASURED or not p.sign:
         return False
-    flat = (p.fits and p.left < _FLAT) or (not p.fits and p.coherence > 0.9)
-    return flat and abs(math.log(max(p.factor, 1e-300))) > _SAME_RATE
+    flat = p.left < _FLAT if p.fits else p.coherence > 0.9 and p.law.y != "motor_torque"
+    limited = p.law.y == "motor_torque" and p.factor < 1.0 and p.coherence < _LINEAR
+    return flat and not limited and abs(math.log(max(p.factor, 1e-300))) > _SAME_RATE
 
 
 def _is_apart(p: Pair) -> bool:

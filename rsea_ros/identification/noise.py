@@ -4,9 +4,8 @@ At the top of the band of a torque-driven actuator only white sensor noise remai
 the command is removed: S_nn = (1 - coherence) S_yy, median over the top of the band. Where
 that is not flat (a smoothed log) or the channel is slower than the command, so that the command's upper half
 is folded over it, the record does not show its noise; the rig's statement counts until a fit has its
-residual. In a loop the command also holds the noise of the sensor that closes it: what is shared is taken
-away only where the channel follows the command, and not the command the channel (Granger, Econometrica 37,
-1969).
+residual; so it does where the command follows the channel (Granger, Econometrica 37, 1969), as in a loop, and
+holds its noise.
 """
 
 import math
@@ -124,8 +123,8 @@ over the band."""
 _FILTERED = 0.1
 """Of the noise that a rig states, the least that is believed: less is a filter's work, not a better
 sensor's."""
-
-
+_HIDDEN = 0.8
+"""Of the RMS at the top of the band: what is left there without what the command shares hides some."""
 _LAGS, _ROWS = 16, 16384
 """Samples before and behind that foretell one, and samples that are foretold at most."""
 _FED_BACK = 0.4
@@ -146,8 +145,11 @@ def noise_floor(record: Record, name: str, sensor: Sensor) -> float:
         return max(float(np.std(np.diff(y, 2))) / math.sqrt(6.0) if len(y) > 3 else 0.0, stated, least)
     if stated > 0.0 and record[name].rate < _SLOWER * record["command"].rate:
         return max(stated, least)
-    unlike = _unlike(record["command"], t, y, may_be_followed=name != "motor_torque")
-    level = math.sqrt(float(np.median(unlike[_top(unlike)])))
+    command, is_made = record["command"], name == "motor_torque"  # by the drive, of its command
+    both, unlike = _powers(command, t, y)
+    whole, level = (math.sqrt(float(np.median(power[_top(power)]))) for power in (both, unlike))
+    if level < min(stated, _HIDDEN * whole) and not is_made and _is_followed(command, t, y):
+        level = min(stated, whole)
     return max(level, least) if _is_flat(unlike) else max(level, stated, least)
 
 
@@ -182,15 +184,14 @@ def _seamless(spectra: ComplexArray, seams: Sequence[int] | IntArray) -> BoolArr
     return whole
 
 
-def _unlike(command: Channel, t: FloatArray, y: FloatArray, may_be_followed: bool) -> FloatArray:
-    """Return the power of a channel that does not follow the command linearly, by frequency.
+def _powers(command: Channel, t: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the power of a channel by frequency, and what of it does not follow the command linearly.
 
     From segments in which no sample is missing, shorter ones where it takes that, else from all.
-    may_be_followed: False for what a drive makes of its command.
     """
     steps = np.diff(t)
     period = float(np.median(steps))
-    held, next_held = (np.nan_to_num(command.held(t + late * period)) for late in (-0.25, 0.75))
+    held = np.nan_to_num(command.held(t - 0.25 * period))
     seams = 1 + np.flatnonzero(steps > _MISSING * period)
     for longest in (_LONGEST, _LONGEST // 4, _LONGEST // 16):
         u, v = (unit_spectra(values, longest, _SEGMENTS) for values in (held, y))
@@ -202,22 +203,20 @@ def _unlike(command: Channel, t: FloatArray, y: FloatArray, may_be_followed: boo
         u, v = (unit_spectra(values, _LONGEST, _SEGMENTS) for values in (held, y))
     power = np.mean(np.abs(v) ** 2, axis=0)
     shared = np.abs(np.mean(v * u.conj(), axis=0)) ** 2 / (np.mean(np.abs(u) ** 2, axis=0) + _TINY)
-    top = _top(power)
-    if may_be_followed and np.median((shared / (power + _TINY))[top]) > _FED_BACK:
-        shared = shared * (_told_later(y, held, next_held, seams) < _FED_BACK)
-    return np.asarray(np.maximum(power - shared, 0.0) / (1.0 - 1.8 / max(2.0, len(v))))
+    return power, np.asarray(np.maximum(power - shared, 0.0) / (1.0 - 1.8 / max(2.0, len(v))))
 
 
-def _told_later(y: FloatArray, held: FloatArray, next_held: FloatArray, seams: IntArray) -> float:
-    """Return the share, 0 to 1, of what is new in the samples of a channel that only later commands tell.
+def _is_followed(command: Channel, t: FloatArray, y: FloatArray) -> bool:
+    """Return whether later commands tell what is new in the samples of a channel.
 
-    New is what neither the samples before nor the commands until then foretell. held, next_held: the command
-    that a sample may show, and the first that may show the sample. seams: as in `_seamless`.
+    New is what neither the samples before nor the commands until then foretell.
     """
+    period = float(np.median(np.diff(t)))
+    held, next_held = (np.nan_to_num(command.held(t + late * period)) for late in (-0.25, 0.75))
     n = np.arange(_LAGS, len(y) - _LAGS)
-    n = n[np.searchsorted(seams, n - _LAGS, "right") == np.searchsorted(seams, n + _LAGS, "right")][:_ROWS]
+    n = n[t[n + _LAGS] - t[n - _LAGS] < (2.0 * _LAGS + 0.5) * period][:_ROWS]
     if len(n) < 64 * _LAGS:
-        return 0.0
+        return False
     y, held, next_held = (v - v.mean() for v in (y, held, next_held))
     lags = np.arange(_LAGS)
     earlier = np.hstack([y[n[:, None] - 1 - lags], held[n[:, None] - lags]])
@@ -225,7 +224,7 @@ def _told_later(y: FloatArray, held: FloatArray, next_held: FloatArray, seams: I
         float(np.sum((y[n] - x @ np.linalg.lstsq(x, y[n], rcond=None)[0]) ** 2))
         for x in (earlier, np.hstack([earlier, next_held[n[:, None] + lags]]))
     )
-    return 1.0 - left / new if new > 0.0 else 0.0
+    return left < (1.0 - _FED_BACK) * new
 
 
 def _is_flat(power: FloatArray) -> bool:

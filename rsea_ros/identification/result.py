@@ -13,7 +13,7 @@ import numpy as np
 
 from rsea_ros.model.rig import END_NAMES, Rig
 from rsea_ros.model.rig_file import RigChoice
-from rsea_ros.records.record import MASKED, SENSED, ComplexArray, Fault, FloatArray, Record
+from rsea_ros.records.record import MASKED, ComplexArray, Fault, FloatArray, Record
 
 SLOW = 1.0
 """Hz. RMS frequency of a command up to which inertia and damping count for nothing."""
@@ -310,11 +310,9 @@ class Identification:
 
     @property
     def times_noise(self) -> dict[str, float]:
-        """Return by channel the RMS of the residual over the noise, of the channels that a verdict uses."""
+        """Return by channel the RMS of the residual over the noise."""
         noise = self.noise_rms
-        ratios = {n: v / noise[n] for n, v in self.residual_rms.items() if noise.get(n, 0.0) > 0.0}
-        counts = (*SENSED, *(["motor_torque"] if self.rig.motion == "measured" else []))
-        return {n: r for n, r in ratios.items() if n in counts} or ratios
+        return {n: v / noise[n] for n, v in self.residual_rms.items() if noise.get(n, 0.0) > 0.0}
 
     @property
     def at_noise(self) -> bool:
