@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from rsea_ros.checks import frozen as freezes
-from rsea_ros.checks.expected import Side, is_commanded, is_still, sides
+from rsea_ros.checks.expected import Side, is_commanded, is_still, quotient, sides
 from rsea_ros.checks.pairs import Pair, each_pair, pairs_of
 from rsea_ros.checks.stamp_findings import rounded_stamps
 from rsea_ros.identification.noise import FEW, step_of
@@ -59,9 +59,20 @@ def dead_channels(
     for n in (n for n in constant if n in doubtful):
         alone = any(n in (p.law.x, p.law.y) and (p.coherence or p.unrelated) for p in known)
         alone = alone and (len(linked - {n}) > 1 or (not linked and nothing_moves))
-        if alone and _shows(n, compared.get(n), rig):
+        if alone and _shows(n, compared.get(n), rig) and not _is_heard(record, n):
             constant[n] = "noise that has nothing to do with the other channels"
     return [Fault("dead_channel", n, 1.0, detail) for n, detail in constant.items() if detail]
+
+
+def _is_heard(record: Record, name: str) -> bool:
+    """Return whether what a channel shows is shown by another, too, line by line of its own power.
+
+    A load that moves passes little of a torque on; weighed by the torque's power, both have little in common.
+    """
+    t, y = record[name].t, record[name].y
+    beside = (np.interp(t, c.t, c.y) for n, c in record.channels.items() if n != name)
+    quotients = (quotient(name, t, other, y) for other in beside)
+    return any(q is not None and q.related > _LINKED and not q.is_unrelated for q in quotients)
 
 
 def _shows(name: str, side: Side | None, rig: Rig) -> bool:

@@ -6,7 +6,7 @@ Two channels of one machine are tied by a law y = P(s) x, late by a lag; the rig
     output held:  deflection = position     ft = (K + c s) position     torque = (K + b s + J s^2) position
                   torque = (1 + b/K s + J/K s^2) ft            torque = (K/s + b + J s) velocity
     without a spring:  torque = (G + b s + J s^2) position
-    otherwise:    torque - ft = (b s + J s^2) position
+    otherwise:    torque = (b s + J s^2) position + ft, which may be late, turned or in another unit
                   torque ~ ft in lag and sign, unless something else moves the output
 
 The coefficients are fitted to the measured response over its coherent lines, for each lag within 2 s, with no
@@ -16,7 +16,7 @@ value of the rig. Where the windows agree, the pair has one part; elsewhere one 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from hashlib import blake2b
@@ -44,6 +44,10 @@ _RELATED = 0.5
 """Coherence by power from which a lag and a factor are those of a law."""
 _FITS = 0.35
 """Median of what the law leaves of the response, over the response."""
+_LEAVES = 0.2
+"""Median of what a law with two torques leaves, over the first: friction and play leave less."""
+_BEGINS = (0.0, 0.2, -0.2, 0.4, -0.4)
+"""s. Lags about which that of a second torque is looked for, beside the one at which both correlate best."""
 _MODEL_ERROR = 0.1
 """Of the response: what friction and play leave of a linear law."""
 _COVERED = 0.5
@@ -72,7 +76,7 @@ _ROTOR = ("rotor.reflected_damping", "rotor.reflected_inertia")
 @dataclass(frozen=True)
 class Law:
     """y = sum_k c_k s^power_k x. expected: c_k by the rig, 0 where it states none. names: of the rig's values
-    that they are, empty for a pure number. less: a channel that is taken off y first."""
+    that they are, empty for a pure number. less: a channel that is taken off y first, by its own pair."""
 
     y: str
     x: str
@@ -239,10 +243,34 @@ def _kept(asked: tuple[Law, ...], content: bytes) -> dict[Law, list[Pair]]:
 
 def _parts(record: Record, law: Law) -> list[Pair]:
     y, x = record[law.y], record[law.x]
-    if law.less:
-        less = record[law.less]
-        y = y.between(less.t[0], np.nextafter(less.t[-1], np.inf))
-        y = Channel(y.t, y.y - np.interp(y.t, less.t, less.y))
+    if not law.less:
+        return _of_two(y, x, law)
+    less = record[law.less]
+    y, x = (c.between(less.t[0], np.nextafter(less.t[-1], np.inf)) for c in (y, x))
+    start, stop = max(y.t[0], x.t[0]), min(y.t[-1], x.t[-1])
+    shared: list[Pair] = []
+    if min(len(y), len(x), len(less)) >= 64 and stop - start > _SHORTEST:
+        shared = _in_parts(lambda a, b: _share(y, x, less, law, a, b), float(start), float(stop), list)
+    if not shared or not all(p.fits and p.clear for p in shared):
+        shared = [Pair(law, float(start), float(stop))]
+    found = []
+    for p in shared:
+        span = (p.start, np.nextafter(p.stop, np.inf))
+        gains = [(1.0, 0.0), *([(p.ratios[0], p.lag)] if p.fits else [])]
+        rests = [Channel(y.t, y.y - g * np.interp(y.t, less.t + lag, less.y)) for g, lag in gains]
+        plain, *other = (_of_two(rest.between(*span), x, law) for rest in rests)
+        near = p.sign > 0 and abs(p.lag) < 0.5 * NEAR and abs(math.log(p.factor)) < _SAME_FACTOR
+        sure = p.fits and (near or not any(q.fits and q.left < 2.0 * p.left for q in plain))
+        found += [p, *(plain if near else other[0])] if sure else plain
+    return found
+
+
+def _loose(law: Law) -> Law:
+    """Return the law of a torque and the one that is taken off it, of which the lag alone counts."""
+    return Law(law.y, law.less, (0,), (0.0,), ("",))
+
+
+def _of_two(y: Channel, x: Channel, law: Law) -> list[Pair]:
     start, stop = max(y.t[0], x.t[0]), min(y.t[-1], x.t[-1])
     if min(y.rate, x.rate) < min(_SLOWEST, 0.6 * max(y.rate, x.rate)):
         simple = law.powers[-1] < 2 and law.powers[0] >= 0 and y.rate < x.rate
@@ -250,24 +278,86 @@ def _parts(record: Record, law: Law) -> list[Pair]:
     if len(y) < 64 or len(x) < 64 or not stop - start > _SHORTEST:
         return []
     both = Signals(y, x, *(_thinned(c) for c in (y, x)))
-    whole = _measure(both, law, float(start), float(stop))
+    return _in_parts(
+        lambda a, b: _measure(both, law, a, b), float(start), float(stop),
+        lambda: _followed(y, x, law, start, stop),
+    )  # fmt: skip
+
+
+def _in_parts(
+    measure: Callable[[float, float], Pair], start: float, stop: float, follow: Callable[[], list[Pair]]
+) -> list[Pair]:
+    """Return a pair for the whole, s, or one for each span in which windows say the same.
+
+    follow: a lag that changes too fast for windows.
+    """
+    whole = measure(start, stop)
     number = 0 if whole.unrelated else int(min(_WINDOWS, (stop - start) // _SHORTEST))
     edges = np.linspace(start, stop, number + 1)
-    windows = [_measure(both, law, float(a), float(b)) for a, b in pairwise(edges)]
+    windows = [measure(float(a), float(b)) for a, b in pairwise(edges)]
     sure = [w for w in windows if w.fits and w.clear]
     if whole.fits and whole.clear and all(_agree(w, whole) for w in sure):
         return [whole]
     if sum(w.stop - w.start for w in sure) < _COVERED * (stop - start):
         if whole.fits and whole.clear:
             return [whole]
-        sure = _followed(y, x, law, float(start), float(stop)) or [whole]
+        sure = follow() or [whole]
     runs: list[list[Pair]] = []
     for w in sure:
         if runs and _agree(runs[-1][-1], w) and _agree(runs[-1][0], w):
             runs[-1].append(w)
         else:
             runs.append([w])
-    return [_joined(run, both) for run in runs]
+    return [_joined(run, measure) for run in runs]
+
+
+def _share(y: Channel, x: Channel, less: Channel, law: Law, start: float, stop: float) -> Pair:
+    """Return the pair of a torque and the one that is to be taken off it, over a span, s.
+
+    1 = P(i w) x / y + g exp(-i w lag) less / y at each line, with real coefficients of P, and g.
+    """
+    pair = _measure(Signals(y, less, *map(_thinned, (y, less))), _loose(law), start, stop)
+    pair = replace(pair, fits=False)
+    fast = max(*(1.0 / c.rate for c in (y, x, less)), 1.0 / _FINEST)
+    y = Channel(y.t + 0.5 / y.rate, y.y) if law.y == "command" else y  # it holds
+    of_x = _response(y, x, law, (start, stop), fast, 0.0)
+    if of_x is None or np.count_nonzero(usable(of_x)) < max(_FEWEST_LINES, len(law.powers) + 3):
+        return pair
+    keep = usable(of_x)
+    w, doubt = 2.0 * np.pi * of_x.frequency[keep], np.hypot(of_x.sd[keep], _MODEL_ERROR)
+    near, lags, turned = np.arange(-_AROUND, _AROUND, 1e-3), [], []
+    for begin in (*_BEGINS, *([pair.lag] if math.isfinite(pair.lag) else [])):
+        of_less = _response(y, Channel(less.t + begin, less.y), law, (start, stop), fast, 0.0)
+        if of_less is not None and len(of_less.frequency) == len(of_x.frequency):
+            lags.append(begin + near)
+            turned.append(np.exp(-1j * np.outer(near, w)) * of_less.value[keep])
+    if not lags:
+        return pair
+    lag, other = np.concatenate(lags), np.concatenate(turned)
+    terms = [np.broadcast_to((1j * w) ** p * of_x.value[keep], other.shape) for p in law.powers]
+    table = np.stack([other, *terms], axis=2) / doubt[:, None]
+    table = np.concatenate([table.real, table.imag], axis=1)
+    size = np.linalg.norm(table, axis=1, keepdims=True) + 1e-300
+    basis, triangle = np.linalg.qr(table / size)
+    target = np.concatenate([1.0 / doubt, np.zeros(len(w))])
+    explained = target @ basis
+    cost = target @ target - np.sum(explained**2, axis=1)
+    k = int(np.argmin(cost))
+    inverse = np.linalg.pinv(triangle[k]) / size[k].T
+    c = inverse @ explained[k]
+    scale = max(1.0, float(cost[k]) / max(2 * len(w) - len(c) - 1, 1))
+    sd = np.linalg.norm(inverse, axis=1) * math.sqrt(scale) / (np.abs(c) + 1e-300)
+    gain, rest = float(c[0]), 1.0 - c[0] * other[k]
+    left = float(np.median(np.abs(rest - sum(v * t[k] for v, t in zip(c[1:], terms, strict=True)))))
+    moves = len({np.sign(v) for v, u in zip(c[1:], sd[1:], strict=True) if u < 0.25}) == 1
+    moves &= float(np.median(np.abs(rest))) > _LEAVES  # else ft itself would be its law
+    apart = np.abs(lag - lag[k]) > 0.5 * NEAR
+    return replace(
+        pair, law=replace(_loose(law), expected=(1.0,)), lag=float(lag[k]), factor=abs(gain),
+        sign=int(np.sign(gain)), coherence=1.0 - left**2, ratios=(gain,), sds=(float(sd[0]),),
+        left=left, fits=bool(left < _LEAVES and sd[0] < 0.25 and moves), unrelated=False,
+        clear=bool(float(cost[apart].min() - cost[k]) > _RIVAL * scale),
+    )  # fmt: skip
 
 
 def _matched(y: Channel, x: Channel, pair: Pair) -> Pair:
@@ -308,12 +398,12 @@ def _followed(y: Channel, x: Channel, law: Law, start: float, stop: float) -> li
     return []
 
 
-def _joined(run: Sequence[Pair], both: Signals) -> Pair:
+def _joined(run: Sequence[Pair], measure: Callable[[float, float], Pair]) -> Pair:
     """Return one part of windows in a row that agree: measured over all of them, if that is clear."""
     first, last = run[0], run[-1]
     if len(run) == 1:
         return first
-    whole = _measure(both, first.law, first.start, last.stop)
+    whole = measure(first.start, last.stop)
     middle = sorted(run, key=lambda p: p.lag)[len(run) // 2]
     return whole if whole.fits and whole.clear else replace(middle, start=first.start, stop=last.stop)
 

@@ -36,6 +36,10 @@ _BY_A_CONSTANT = "a current, a voltage or a count"
 RIGHT_RIG = "is this the right rig? name another with --rig, or another joint with --joint"
 TOGETHER = (("position", "velocity"), ("command", "motor_torque"))
 """Channels of one encoder and of one drive, which share a unit, a sign and a clock."""
+Group = Mapping[str, float]
+"""Channels that change as one, each by so many times the change."""
+AT_MOTOR: Group = {"position": 1.0, "velocity": 1.0, "command": -1.0, "motor_torque": -1.0}
+"""By the logarithm of the gear's ratio, where all that a drive reports is on its own side of the gear."""
 
 ALLOWED = 1.1
 """Logarithm of a gain, either way, that a bench may have: a factor of 3, that of a drive at its limit."""
@@ -140,6 +144,10 @@ def judged(pairs: Sequence[Pair], rig: Rig) -> tuple[list[Verdict], list[Pair]]:
         within = [p for p in pairs if p.start < stop - 1e-6 and p.stop > start + 1e-6 and p.clear]
         for kind, equations in _kinds(within):
             changes, convicted = _explained(equations, kind, rig)
+            ratio = _of_gear(changes) if kind == "scale" else 0.0
+            if ratio and abs(ratio - math.log(rig["gear.ratio"])) > _UNIT:
+                verdicts.append(Verdict("gear", "gear.ratio", ratio, start, stop))
+                continue
             for name, value in changes.items():
                 if name in convicted:
                     verdicts.append(Verdict("wrong_rig" if "." in name else kind, name, value, start, stop))
@@ -199,17 +207,22 @@ def _explained(equations: Sequence[Equation], kind: str, rig: Rig) -> tuple[dict
     if not any(abs(e.left({})) > _HOLDS for e in equations):
         return {}, set()
     names = sorted({n for e in equations for n in e.terms})
-    channels: list[tuple[str, ...]] = [(n,) for n in names if "." not in n]
-    channels += [both for both in TOGETHER if all(n in names for n in both)]
-    values = [(n,) for n in names if "." in n]
+    channels: list[Group] = [{n: 1.0} for n in names if "." not in n]
+    channels += [dict.fromkeys(both, 1.0) for both in TOGETHER if all(n in names for n in both)]
+    if kind == "scale" and {"ft", "position"} <= {*names}:
+        channels.append({n: v for n, v in AT_MOTOR.items() if n in names})
+    values: list[Group] = [{n: 1.0} for n in names if "." in n]
     changes, rivals = _fewest(equations, kind, channels, values, rig)
+    if _of_gear(changes):
+        return changes, {n for n in changes if n in AT_MOTOR}
     if kind == "scale" and (odd := {n for n, v in changes.items() if n in _UNITS and _is_odd(n, v, rig)}):
-        channels = [g for g in channels if not odd & set(g)]  # it is another rig, not another unit
+        channels = [g for g in channels if not odd & g.keys()]  # it is another rig, not another unit
         changes, rivals = _fewest(equations, kind, channels, values, rig)
     least = {"sign": 0.5, "scale": ALLOWED, "clock_offset": NEAR}[kind]
     accused = {n for n, v in changes.items() if "." not in n and abs(v) > least}
     if kind != "clock_offset":
-        accused = {n for n in accused if max(e.pair.coherence for e in equations if n in e.terms) > _WHOLE}
+        told = {n: max(e.pair.coherence for e in equations if n in e.terms) for n in accused}
+        accused = {n for n in accused if max(told.get(m, 0.0) for m in {n, *_partner(n)}) > _WHOLE}
     convicted = {n for n in accused if all(n in r for r in rivals) and _is_witnessed(n, changes, equations)}
     return changes, convicted | {n for n in changes if "." in n}
 
@@ -217,8 +230,8 @@ def _explained(equations: Sequence[Equation], kind: str, rig: Rig) -> tuple[dict
 def _fewest(
     equations: Sequence[Equation],
     kind: str,
-    channels: Sequence[tuple[str, ...]],
-    values: Sequence[tuple[str, ...]],
+    channels: Sequence[Group],
+    values: Sequence[Group],
     rig: Rig,
 ) -> tuple[dict[str, float], list[set[str]]]:
     """Return the sizes of the fewest changes that explain the equations, and the names of all as good."""
@@ -227,11 +240,18 @@ def _fewest(
         for chosen in combinations([*channels, *values], number):
             changed = {n for group in chosen for n in group}
             if len(changed) == sum(map(len, chosen)):
-                tried.append((*_cost(equations, chosen, kind, values, rig), changed))
-    if kind == "scale":  # a unit is likelier than a factor that none has
-        tried = [(v + _ODD * sum(_is_odd(n, c[n], rig) for n in x), c, x) for v, c, x in tried]
+                cost, sizes = _cost(equations, chosen, kind, values, rig)
+                odd = [sum(_is_odd(n, sizes[n], rig) for n in g) for g in chosen if kind == "scale"]
+                cost += _ODD * sum(min(k, 2) for k in odd)  # a unit is likelier than a factor that none has
+                tried.append((cost, sizes, changed))
     cost, changes, _ = min(tried, key=lambda one: one[0])
     return changes, [changed for v, _, changed in tried if v < cost + 0.5 * _CHANGE]
+
+
+def _of_gear(changes: Mapping[str, float]) -> float:
+    """Return the logarithm of a ratio by which all of a drive's channels are off, 0 where they are not."""
+    off = [changes[n] * by for n, by in AT_MOTOR.items() if n in changes]
+    return off[0] if "position" in changes and len(off) > 2 and np.ptp(off) < 1e-9 else 0.0
 
 
 def _is_odd(name: str, gain: float, rig: Rig) -> bool:
@@ -249,9 +269,9 @@ def _spread(rig: Rig, name: str) -> float:
 
 def _cost(
     equations: Sequence[Equation],
-    chosen: Sequence[tuple[str, ...]],
+    chosen: Sequence[Group],
     kind: str,
-    values: Sequence[tuple[str, ...]],
+    values: Sequence[Group],
     rig: Rig,
 ) -> tuple[float, dict[str, float]]:
     """Return the cost of some changes, and all sizes. values: of the rig, which move by their spread."""
@@ -260,18 +280,24 @@ def _cost(
         wrong = sum((sum(n in turned for n in e.terms) + e.value) % 2.0 for e in equations)
         return 1.5 * _CHANGE * wrong + _CHANGE * len(chosen), dict.fromkeys(turned, 1.0)
     groups = [*chosen, *(v for v in values if v not in chosen)]
-    rows = [[sum(e.terms.get(n, 0.0) for n in g) / e.sd for g in groups] for e in equations]
+    rows = [[sum(e.terms.get(n, 0.0) * v for n, v in g.items()) / e.sd for g in groups] for e in equations]
     right = [e.value / e.sd for e in equations]
     for k, group in enumerate(groups[len(chosen) :], len(chosen)):
-        rows.append([float(i == k) / max(_spread(rig, group[0]), _LEAST_SPREAD) for i in range(len(groups))])
+        spread = max(_spread(rig, *group), _LEAST_SPREAD)
+        rows.append([float(i == k) / spread for i in range(len(groups))])
         right.append(0.0)
     if not groups:
         return float(np.sum(np.square(right))), {}
     matrix: FloatArray = np.array(rows)
     size = np.linalg.lstsq(matrix, np.array(right), rcond=None)[0]
     left = np.array(right) - matrix @ size
-    changes = {n: float(v) for g, v in zip(groups, size, strict=True) for n in g}
+    changes = {n: float(v) * by for g, v in zip(groups, size, strict=True) for n, by in g.items()}
     return float(np.sum(np.minimum(left**2, 4.0 * _CHANGE))) + _CHANGE * len(chosen), changes
+
+
+def _partner(name: str) -> set[str]:
+    """Return the channels of the same encoder or drive, itself with them; none for another."""
+    return {n for both in TOGETHER if name in both for n in both}
 
 
 def _is_witnessed(name: str, changes: Mapping[str, float], equations: Sequence[Equation]) -> bool:
@@ -280,7 +306,7 @@ def _is_witnessed(name: str, changes: Mapping[str, float], equations: Sequence[E
     agree = [set(e.terms) & sound for e in equations if abs(e.left(changes)) < _HOLDS]
     linked = {n for pair in agree if len(pair) == 2 for n in pair}
     knows = {n for e in equations if name in e.terms for n in e.terms if n != name}
-    partner = {n for both in TOGETHER if name in both for n in both}
+    partner = _partner(name)
     knows |= {n for e in equations if partner & set(e.terms) for n in e.terms if n not in partner}
     return bool(linked & knows)
 
@@ -295,13 +321,15 @@ def verdict_findings(pairs: Sequence[Pair], rig: Rig, axis: str) -> tuple[list[F
     late: dict[str, float] = {}
     for kind, name in dict.fromkeys((v.kind, v.name) for v in verdicts):
         of = [v for v in verdicts if (v.kind, v.name) == (kind, name)]
-        about = [p for p in pairs if name in (p.law.x, p.law.y, *p.law.names)]
+        about = [p for p in pairs if kind == "gear" or name in (p.law.x, p.law.y, *p.law.names)]
         where = _where(of, (min(p.start for p in about), max(p.stop for p in about)))
         if kind == "clock_offset":
             findings.append(_late(of, where))
             late |= {} if where else {name: float(np.median([v.value for v in of]))}
         elif kind == "sign":
             findings.append(_turned(name, axis, where))
+        elif kind == "gear":
+            findings.append(_geared(float(np.median([v.value for v in of])), rig))
         elif kind == "scale":
             findings.append(_scale(name, float(np.median([v.value for v in of])), rig, where))
         elif not where:
@@ -313,7 +341,9 @@ def verdict_findings(pairs: Sequence[Pair], rig: Rig, axis: str) -> tuple[list[F
     untimed = [p.law.y for p in pairs if math.isnan(p.lag) and not p.coherence]
     findings += [Finding("green", "clock_offset", y, detail=few, remedy=faster) for y in untimed]
     findings += [_contradiction(p) for p in contradictions if not {p.law.x, p.law.y} & named]
-    shown = [p for p in pairs if (_is_off(p) or _is_apart(p)) and p not in contradictions]
+    tied = {(p.law.y, p.law.x) for p in pairs if p.fits and p.law.expected[0]}
+    apart = [p for p in pairs if _is_apart(p) and (p.law.expected[0] or (p.law.y, p.law.x) not in tied)]
+    shown = [p for p in pairs if (_is_off(p) or p in apart) and p not in contradictions]
     findings += [_contradiction(p) for p in shown if not {p.law.x, p.law.y} & named]
     return findings, late
 
@@ -365,6 +395,17 @@ def _scale(name: str, gain: float, rig: Rig, where: str) -> Finding:
     expected = "1, SI at the gear output"
     detail = " ".join(filter(None, (detail, where)))
     return Finding("red", "scale", name, value, "1", expected=expected, detail=detail, remedy=remedy)
+
+
+def _geared(ratio: float, rig: Rig) -> Finding:
+    """Return the finding of a drive whose channels are all on its own side of a gear that the rig lacks."""
+    off = math.exp(ratio)
+    return Finding(
+        "amber", "wrong_rig", "gear.ratio", off, "1", expected=f"{rig['gear.ratio']:.4g}",
+        detail=f"angles are {off:.3g} times and torques 1/{off:.3g} of what ft and the rig make them: "
+        "the drive's own side of a gear of about this ratio",
+        remedy=f"publish at its output: `scale: {1.0 / off:.3g}` for angles, `scale: {off:.3g}` for torques",
+    )  # fmt: skip
 
 
 def _unit(channel: str, factor: Factor) -> str:
@@ -438,7 +479,7 @@ def _is_apart(p: Pair) -> bool:
     if p.law.y == "ft" and p.law.expected[0]:
         return not p.fits and p.left > 0.5 and not p.unrelated and math.isfinite(p.left)
     plain = p.law.y == "motor_torque" and not p.law.expected[0] and p.law.x == "ft"
-    return plain and p.coherence > 0.5 and abs(p.lag) > NEAR
+    return plain and p.clear and p.coherence > 0.5 and abs(p.lag) > NEAR
 
 
 def start_of(pairs: Sequence[Pair], rig: Rig) -> Start:

@@ -115,7 +115,9 @@ NAMES = ("command", "position", "velocity", "ft")
     ],
 )
 def test_a_sensor_is_dead_that_shares_nothing_with_others_that_share_much(pairs, dead):
-    record = Record({n: channel(WAVE + 0.1 * k) for k, n in enumerate(NAMES)})
+    noise = np.random.default_rng(1).standard_normal((4, 208))
+    moving = {n: channel(np.convolve(e, np.ones(9), "valid")) for n, e in zip(NAMES, noise, strict=True)}
+    record = Record(moving)
     found = dead_channels(record, {}, RIG, pairs=pairs)
     assert [f.channel for f in found] == dead
     for f in found:
@@ -126,6 +128,8 @@ def test_a_sensor_is_dead_that_shares_nothing_with_others_that_share_much(pairs,
     assert not dead_channels(record, hidden, RIG, pairs=pairs)
     still = Record({n: channel(np.zeros(200)) for n in NAMES})
     assert not dead_channels(still, {}, RIG, pairs=pairs)
+    heard = Record({n: channel(c.y + 9.0 * np.cumsum(moving["command"].y)) for n, c in moving.items()})
+    assert not dead_channels(heard, {}, RIG, pairs=pairs), "by its own power it has much in common"
 
 
 def test_a_constant_channel_is_dead_where_its_signal_would_show():

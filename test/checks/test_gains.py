@@ -1,6 +1,7 @@
 """Sign, scale and smoothing are reported with their remedy; effects and strangers' rigs raise no alarm."""
 
 import functools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -232,3 +233,74 @@ def test_two_channels_alone_show_their_contradiction_and_convict_none():
     (finding,) = (f for f in said(record) if f.kind in ("contradiction", "scale", "sign"))
     assert (finding.kind, finding.light) == ("contradiction", "amber")
     assert finding.value == pytest.approx(3.4, rel=0.1)
+
+
+FREE = load_rig("paper_high_impedance").with_values({
+    "rotor.reflected_inertia": 0.06, "rotor.reflected_damping": 0.5, "spring.stiffness": 270.0,
+    "spring.damping": 0.3,
+})  # fmt: skip
+FREE = replace(FREE, clamped=frozenset({"housing_end"}), quantities={
+    **FREE.quantities, "spring_end.inertia": replace(FREE.quantities["rotor.reflected_inertia"], value=0.13),
+    "spring_end.damping": replace(FREE.quantities["rotor.reflected_damping"], value=0.3),
+})  # fmt: skip
+HEAVY = FREE.with_values({"rotor.reflected_inertia": 0.953, "spring_end.inertia": 3.0})
+
+
+def free_run(rig=FREE):
+    torque = np.repeat(5.0 * np.random.default_rng(1).standard_normal(1050), 4)
+    return rsea.simulate(rig, torque, 280.0, seed=2)
+
+
+@pytest.mark.parametrize(
+    ("change", "wrong"),
+    [
+        (lambda c: {}, []),
+        (lambda c: {"ft": Channel(c["ft"].t, -c["ft"].y)}, [("sign", "ft")]),
+        (lambda c: {"ft": Channel(c["ft"].t + 0.12, c["ft"].y)}, [("clock_offset", "ft")]),
+        (lambda c: {"ft": Channel(c["ft"].t, 1e3 * c["ft"].y)}, [("scale", "ft")]),
+        (
+            lambda c: {n: Channel(c[n].t, -c[n].y) for n in ("position", "velocity")},
+            [("sign", "position"), ("sign", "velocity")],
+        ),
+    ],
+)
+def test_where_the_output_moves_two_torques_and_a_motion_tell_which_is_wrong(change, wrong):
+    """All of these were green, or an encoder's delay."""
+    found = said(free_run().with_channels(**change(free_run().channels)), FREE)
+    assert sorted((f.kind, f.channel) for f in found) == wrong
+    assert all(f.light == "red" for f in found)
+    if wrong == [("clock_offset", "ft")]:
+        assert found[0].value == pytest.approx(0.12, abs=0.005)
+
+
+@pytest.mark.parametrize(("rig", "run_of"), [(RIG, run), (FREE, free_run)])
+def test_what_a_drive_reports_on_its_own_side_of_the_gear_is_one_factor(rig, run_of):
+    """Three red lines, one of them of the F/T sensor, which alone was right."""
+    by = {"position": 50.0, "velocity": 50.0, "command": 0.02, "motor_torque": 0.02}
+    record = scale_channels(run_of(), **by)
+    other = check_record(record, rig).findings
+    (gear,) = (f for f in other if f.channel == "gear.ratio")
+    assert gear.light == "amber" and gear.value == pytest.approx(50.0, rel=0.1)
+    assert not any(f.light == "red" for f in other)
+    stated = rig.with_values({"gear.ratio": 50.0})
+    assert {(f.kind, f.channel) for f in said(record, stated)} == {("scale", n) for n in by}
+
+
+def test_a_torque_that_is_no_drive_s_is_told_beside_its_command():
+    """It was green, and the model fitted; intervals were withheld without a word."""
+    torque = run()["motor_torque"]
+    wrong = run().with_channels(motor_torque=Channel(torque.t, 2.5 * torque.y))
+    (finding,) = said(wrong)
+    assert (finding.kind, finding.channel, finding.light) == ("contradiction", "motor_torque", "amber")
+    assert finding.value == pytest.approx(2.5, rel=0.1)
+    assert rsea.identify(wrong, RIG).verdict == "misfit"
+
+
+def test_a_torque_of_which_a_heavy_load_lets_little_through_is_not_dead():
+    """An F/T sensor that was turned was dead, and so was a velocity beside a dead position."""
+    record = free_run(HEAVY)
+    assert not check_record(scale_channels(record, ft=-1.0), HEAVY).of("dead_channel")
+    q = record["position"]
+    noise = Channel(q.t, 1e-5 * np.random.default_rng(3).standard_normal(len(q)))
+    (dead,) = check_record(record.with_channels(position=noise), HEAVY).of("dead_channel")
+    assert dead.channel == "position"
