@@ -122,9 +122,10 @@ def layout_of(
     known = sorted(dict.fromkeys((usual, "\t", ";", ",", "|", BLANKS)), key=lambda one: one == wanted.decimal)
     tried = [wanted.delimiter] if wanted.delimiter else known
     layouts = [_layout(lines, one, wanted) for one in tried]
-    for layout in (one for one in layouts if not one.headed):
-        for line, one in product(reversed(comments), known):  # as numpy.savetxt(header=…) writes them
-            named = TextLayout(layout.delimiter, tuple(split(line.lstrip(" \t#%"), one)), False)
+    above = [text for line in reversed(comments) for text in (line.lstrip(" \t#%"), line)]
+    for layout in (one for one in layouts if not one.headed or any(map(is_decimal, one.names))):
+        for line, one in product(above, known):  # as numpy.savetxt(header=…), rostopic write them
+            named = TextLayout(layout.delimiter, tuple(split(line, one)), False)
             if len(named.names) == len(layout.names) and all(_names(named, column) for column in columns):
                 return 0, named
     for layout in sorted(layouts, key=lambda layout: layout.headed):
