@@ -30,7 +30,7 @@ _SLOW = 0.6
 _LEFT_OUT, _MUCH = ("mixed_rows", "stray_stamps"), 0.02
 """Faults whose rows are left out for their stamps, and the share of them that is red."""
 _OF_ALL = ("missing_topic", "coarse_steps", "coarse_stamps", "rounded_stamps", "clock_jump",
-           "partly_recorded", "early_torque", "held_samples", "mixed_rows")  # fmt: skip
+           "partly_recorded", "early_torque", "held_samples", "mixed_rows", "pause")  # fmt: skip
 """Faults of a whole channel, whose share of its samples means nothing."""
 _MENDED = ("early_torque",)
 """Faults that leave no doubt in a result once they are mended."""
@@ -44,6 +44,7 @@ _REMEDIES = {
     "partly_recorded": "start the recorder first and stop it last, or cut the run with --from and --to",
     "unnamed_file": "remove it, or give its own name to read it",
     "duplicate_stamps": "stamp at acquisition, not on arrival",
+    "pause": "nothing to do, unless the zero of a sensor moved meanwhile: then cut the record there",
     "mixed_rows": "keep the clocks from being set during a run; --keep-rows leaves these rows in",
     "stray_stamps": "look at the clock; --keep-rows leaves these rows in",
     "clock_jump": "keep the clocks from being set during a run",

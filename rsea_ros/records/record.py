@@ -397,6 +397,7 @@ FAULT_KINDS: Mapping[str, str] = {
     "clock_drift": "the clock of a channel runs faster or slower than the command's",
     "early_torque": "each motor torque has the stamp of its command; it is read just after that stamp",
     "dropped_samples": "samples are missing: the stamps have gaps",
+    "pause": "nothing was recorded for a while, of any channel",
     "mixed_rows": "the clock stepped back and the log was sorted by it: rows of two times, left out",
     "partly_recorded": "a channel starts later or ends earlier than the run",
     "duplicate_stamps": "stamps repeat; the first sample of each is kept",
