@@ -73,7 +73,8 @@ def guess_map(path: str | Path) -> str:
 
 def _lines(table: Table, units: Mapping[str, str]) -> Iterator[str]:
     """Yield the lines of a map but the first. units: by column what a row of the file says."""
-    numbers = {name: table[name] for name in units if name in table.columns and _moves(table[name])}
+    held = {name: table[name] for name in units if name in table.columns}
+    numbers = {n: y for n, y in held.items() if np.isfinite(y).sum() > 2 and np.nanmax(y) > np.nanmin(y)}
     stated = {name: _unit_in(name, text) for name, text in units.items()}
     yield "# A `?` asks for what the file does not say. Units:"
     yield from (f"#   {dimension}: {', '.join(names)}" for dimension, names in FACTORS.items())
@@ -104,10 +105,6 @@ def _lines(table: Table, units: Mapping[str, str]) -> Iterator[str]:
     for name in table.columns:
         if name not in (time, *channels.values()):
             yield f"# not used: {_quoted(name)}, {_range(table[name])}"
-
-
-def _moves(values: FloatArray) -> bool:
-    return bool(np.isfinite(values).sum() > 2 and np.nanmax(values) > np.nanmin(values))
 
 
 def _range(values: FloatArray) -> str:

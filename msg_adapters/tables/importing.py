@@ -195,11 +195,10 @@ def _streams(
     streams: list[tuple[tuple[str, ...], BoolArray]] = []
     for name, terms in channels.items():
         own = keep & np.logical_and.reduce([table.given(column) for term in terms for column in term.columns])
-        is_same = [2 * np.sum(rows & own) >= min(np.sum(rows), np.sum(own)) - 1 for _, rows in streams]
-        same = [stream for stream, so in zip(streams, is_same, strict=True) if so]
-        joined = (*(n for names, _ in same for n in names), name)
-        streams = [stream for stream, so in zip(streams, is_same, strict=True) if not so]
-        streams.append((joined, np.logical_or.reduce([own, *(rows for _, rows in same)])))
+        same = [s for s in streams if 2 * np.sum(s[1] & own) >= min(np.sum(s[1]), np.sum(own)) - 1]
+        names = (*(n for s in same for n in s[0]), name)
+        streams = [s for s in streams if s[0][0] not in names]
+        streams.append((names, np.logical_or.reduce([own, *(rows for _, rows in same)])))
     return streams if len(streams) > 1 else [(tuple(channels), np.ones_like(keep))]
 
 
@@ -317,10 +316,9 @@ def _held(table: Table, where: RowFilter) -> str:
 
 
 def _rows_left_out(path: str | Path, table: Table, undated: int) -> Iterator[Fault]:
-    no_stamp = "no stamp, or no value to choose rows by"
-    for count, reason in ((table.left_out, table.first), (undated, no_stamp)):
+    for count, why in ((table.left_out, table.first), (undated, "no stamp, or no value to choose rows by")):
         if count:
-            detail = f"{count} of {table.rows} rows left out: {reason}"
+            detail = f"{count} of {table.rows} rows left out: {why}"
             yield Fault("rows_left_out", Path(path).name, count / table.rows, detail)
 
 
@@ -348,10 +346,7 @@ that such a one lacks without being told, at the most."""
 
 
 def _lacking(t: FloatArray, rows: FloatArray) -> tuple[int, float] | None:
-    """Return how many values a column lacks that has them evenly among rows, and from when on; else None.
-
-    t, rows: stamps of both, s.
-    """
+    """Return how many values a column lacks that has some evenly (t) among rows, and from when on, s."""
     step = np.diff(t, prepend=rows[0], append=rows[-1])
     period = float(np.median(step))
     if np.mean(step > GAP * period) > _OFTEN:
@@ -404,16 +399,13 @@ def _stamps(
     if t[-1] == t[0]:
         raise ImportMapError(f"{mapping.time.column} is {t[0]:g} s in every row, expected a clock that runs")
     spread, detail = spread_repeats(t)
-    share = float(np.mean(np.diff(t, prepend=-np.inf) == 0.0))
+    share, inside = float(np.mean(np.diff(t, prepend=-np.inf) == 0.0)), keep[dated]
     faults += [Fault("coarse_stamps", path.name, share, detail)] if detail else []
-    inside = keep[dated]
     return dated[inside], spread[inside], notes, faults
 
 
-_COUNTERS = [2.0**bits * 10.0**-places for bits in (16, 32) for places in (0, 3, 6, 9)]
-"""Where counters of 16 and 32 bits begin anew, also of ms, µs or ns that were made s."""
-_NEAR = 5.0
-"""Usual steps: as far a counter goes on while it begins anew."""
+_COUNTERS, _NEAR = [2.0**bits * 10.0**-places for bits in (16, 32) for places in (0, 3, 6, 9)], 5.0
+"""Where counters of 16 and 32 bits begin anew, also of ms, µs, ns made s; usual steps that they go then."""
 
 
 def without_wraps(x: FloatArray) -> tuple[FloatArray, str]:
@@ -424,8 +416,7 @@ def without_wraps(x: FloatArray) -> tuple[FloatArray, str]:
         turns = np.rint(step / span)
         turns[np.abs(step - turns * span) > _NEAR * usual] = 0.0
         if np.any(turns < 0.0) and np.ptp(x) <= span:
-            count = int(np.count_nonzero(turns < 0.0))
-            note = f"begins anew at {span:.10g}, as a counter does ({count} times): unwrapped"
+            note = f"begins anew at {span:.10g}, as a counter does ({np.sum(turns < 0.0)} times): unwrapped"
             return x - span * np.cumsum(turns), note
     return x, ""
 

@@ -97,12 +97,8 @@ def split(line: str, delimiter: str) -> list[str]:
     return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter, skipinitialspace=True), [])]
 
 
-def index_in(column: str, names: Sequence[str]) -> int:
-    """Return where a column stands, by its name or its number, from 1. Raises ValueError for neither."""
-    return int(column) - 1 if _is_number(column, names) else index_of(column, names)
-
-
 def _is_number(column: str, names: Sequence[str]) -> bool:
+    """Return whether a column is asked for by its number, from 1."""
     return column not in names and column.isdecimal() and 1 <= int(column[:6]) <= len(names)
 
 
@@ -297,7 +293,8 @@ class _Reader:
         self._decimal, self._labels, self._stamps = wanted.decimal, wanted.labels, wanted.stamps
         self._dated: set[str] = set()
         places = {column: base_and_index(column, layout.names) for column in wanted.columns}
-        self._indices = {c: index_in(base, layout.names) for c, (base, _) in places.items()}
+        by = {c: (base, _is_number(base, layout.names)) for c, (base, _) in places.items()}
+        self._indices = {c: int(b) - 1 if n else index_of(b, layout.names) for c, (b, n) in by.items()}
         self._elements = {column: element for column, (_, element) in places.items()}
         self._has_lists = any(element is not None for element in self._elements.values())
         self._parts: dict[str, list[FloatArray | Labels]] = {column: [] for column in self._indices}

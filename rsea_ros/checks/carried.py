@@ -79,7 +79,7 @@ def _rises_rarely(channel: Channel) -> bool:
 
 
 _AGAIN = ("missing_topic", "frozen_samples", "dropped_samples", "duplicate_stamps", "clock_jump", "outliers",
-          "clipping", "nan", "coarse_steps", "early_torque", "held_samples",
+          "clipping", "nan", "coarse_steps", "early_torque", "held_samples", "interpolated",
           "mixed_rows", "pause", "rounded_stamps")  # fmt: skip
 """Faults that the diagnosis finds and masks itself."""
 

@@ -423,6 +423,7 @@ FAULT_KINDS: Mapping[str, str] = {
     "wrong_rig": "the record does not fit the rig",
     "coarse_steps": "values in much larger steps than those of the rig's sensor",
     "held_samples": "the log repeats the values of a slow sensor; the repeats are left out",
+    "interpolated": "the log was resampled on straight lines; the samples between their ends are left out",
     "frozen_samples": "samples that repeat while the machine moves",
     "missing_topic": "a channel of the rig's sensors is missing",
     "nan": "values that are not a number",

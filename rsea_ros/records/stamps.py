@@ -282,9 +282,9 @@ def _without_long_pauses(record: Record) -> tuple[Record, list[Fault]]:
         if (stray := stamp_order.far_apart(c.t, stamp_order.LONGEST_PAUSE)).any():
             channels[name] = Channel(c.t[~stray], c.y[~stray])
             faults.append(stamp_order.stray_fault(stray, name))
-    periods = {name: _SHORTEST_JUMP * stamp_order.median_period(c.t) for name, c in channels.items()}
-    longest = {name: max(stamp_order.LONGEST_PAUSE, period) for name, period in periods.items()}
-    pauses = {name: np.abs(np.diff(c.t)) > longest[name] for name, c in channels.items()}
+    least = {n: _SHORTEST_JUMP * stamp_order.median_period(c.t) for n, c in channels.items()}
+    longest = {n: max(stamp_order.LONGEST_PAUSE, period) for n, period in least.items()}
+    pauses = {n: np.abs(np.diff(c.t)) > longest[n] for n, c in channels.items()}
     if all(at.any() for at in pauses.values()):
         for name, at in pauses.items():
             channels[name], jump = _shorten_steps(channels[name], name, at)
@@ -292,24 +292,21 @@ def _without_long_pauses(record: Record) -> tuple[Record, list[Fault]]:
     return record.with_channels(**channels), faults
 
 
-def _expected_span(record: Record, name: str) -> float:
-    """Return how long a channel should last, s: as the command; the command as the others."""
-    if name != "command" and "command" in record and len(record["command"]) > 1:
-        return float(np.ptp(record["command"].t))
-    spans = {(len(c), float(np.ptp(c.t))) for n, c in record.channels.items() if n != name and len(c) > 1}
-    return float(np.median([span for _, span in spans])) if spans else 0.0
-
-
 def _without_jumps(record: Record, name: str) -> tuple[Channel, list[Fault]]:
-    """Take out steps of the clock: those back for good, and one that makes a channel longer than others."""
-    channel, expected = record[name], _expected_span(record, name)
+    """Take out steps of the clock: those back for good, and one that makes a channel longer than others.
+
+    A channel should last as the command does, the command as the others.
+    """
+    channel, others = record[name], [n for n in record.channels if n != name]
     if len(channel) < 3:
         return channel, []
     at = stamp_order.jumps_back(channel.t)
     step, period = np.diff(channel.t), stamp_order.median_period(channel.t)
+    known = ["command"] if "command" in others and len(record["command"]) > 1 else others
+    spans = {(len(record[n]), float(np.ptp(record[n].t))) for n in known if len(record[n]) > 1}
+    expected = float(np.median([span for _, span in spans])) if spans else 0.0
     surplus, largest = float(channel.t[-1] - channel.t[0]) - expected, int(np.argmax(step))
-    others = [n for n in record.channels if n != name] or [name]
-    beside = record["command" if "command" in others else others[0]].t
+    beside = record["command" if "command" in others else (others or [name])[0]].t
     if (
         expected
         and step[largest] > _SHORTEST_JUMP * period
