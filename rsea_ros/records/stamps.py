@@ -275,7 +275,7 @@ def _check_even(channel: Channel, where: str) -> None:
 
 
 def _without_long_pauses(record: Record) -> tuple[Record, list[Fault]]:
-    """Leave out few samples far from all others; where all channels pause for too long, the clock was set."""
+    """Leave out few samples far from all others; shorten a pause of all that is too long, or was a set clock."""
     faults: list[Fault] = []
     channels = dict(record.channels)
     for name, c in () if record.keeps_rows else record.channels.items():
@@ -287,7 +287,8 @@ def _without_long_pauses(record: Record) -> tuple[Record, list[Fault]]:
     pauses = {n: np.abs(np.diff(c.t)) > longest[n] for n, c in channels.items()}
     if all(at.any() for at in pauses.values()):
         for name, at in pauses.items():
-            channels[name], jump = _shorten_steps(channels[name], name, at)
+            left = 2.0 * max(_PAUSE, 2.0 * max(least.values()))  # still a pause, behind which all begins anew
+            channels[name], jump = _shorten_steps(channels[name], name, at, left)
             faults += jump
     return record.with_channels(**channels), faults
 
@@ -324,11 +325,10 @@ def _is_shared(step: FloatArray, t: FloatArray) -> bool:
     return len(t) > 2 and bool(np.any(long & (t[:-1] <= begin) & (t[1:] >= end)))
 
 
-def _shorten_steps(channel: Channel, name: str, at: BoolArray) -> tuple[Channel, list[Fault]]:
-    """Return the channel with each step of `at` as long as a period, and the fault."""
-    step = np.diff(channel.t)
-    shift = np.concatenate([[0.0], np.cumsum(np.where(at, step - stamp_order.median_period(channel.t), 0.0))])
+def _shorten_steps(c: Channel, name: str, at: BoolArray, left: float = 0.0) -> tuple[Channel, list[Fault]]:
+    """Return a channel with each step of `at` as long as a period, or as `left` (s), and the fault."""
+    step, left = np.diff(c.t), max(left, stamp_order.median_period(c.t))
+    shift = np.concatenate([[0.0], np.cumsum(np.where(at, step - left, 0.0))])
     first, largest = int(np.argmax(at)), float(np.abs(shift).max())
-    detail = f"{largest:.4g} s at {channel.t[first]:.3f} s"
-    share = 1.0 - (first + 1) / len(channel.t)
-    return Channel(channel.t - shift, channel.y), [Fault("clock_jump", name, share, detail, largest, "s")]
+    share, detail = 1.0 - (first + 1) / len(c.t), f"{largest:.4g} s at {c.t[first]:.3f} s"
+    return Channel(c.t - shift, c.y), [Fault("clock_jump", name, share, detail, largest, "s")]
