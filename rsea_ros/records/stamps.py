@@ -275,7 +275,7 @@ def _check_even(channel: Channel, where: str) -> None:
 
 
 def _without_long_pauses(record: Record) -> tuple[Record, list[Fault]]:
-    """Leave out few samples far from all others; shorten a pause of all that is too long, or was a set clock."""
+    """Leave out few samples far from all others; shorten what is too long a pause of all, or a set clock."""
     faults: list[Fault] = []
     channels = dict(record.channels)
     for name, c in () if record.keeps_rows else record.channels.items():
