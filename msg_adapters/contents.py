@@ -91,7 +91,7 @@ class Contents:
 
 REMARKS = "rsea"
 NOTES, FAULTS = "rsea_notes", "rsea_faults"
-KEPT = frozenset({"rows_left_out", "missing_values", "coarse_stamps", "raw_codes"})
+KEPT = frozenset({"rows_left_out", "missing_values", "coarse_stamps", "out_of_order", "raw_codes"})
 """Faults that no reader of the bag could find again."""
 _LONGEST, _MOST = 500, 50
 

@@ -70,7 +70,7 @@ def test_a_clock_that_was_set_leaves_no_years_in_any_channel():
     years = np.where(np.arange(COUNT) < 50, 0.0, 1.7e9)
     record = _record(t + years, command=t + years, position=t + 1e-3 + years)
     repaired, faults = repair_stamps(record)
-    assert [f.kind for f in faults] == ["clock_jump"] * 3
+    assert [f.kind for f in faults] == ["clock_jump"] * 3 + ["pause"]
     assert repaired.stop - repaired.start < 2 * COUNT * PERIOD
 
 
@@ -256,6 +256,49 @@ def test_rows_that_are_left_out_can_be_kept_and_are_red():
     assert len(repair_stamps(replace(mixed, keeps_rows=True))[0]["ft"]) == len(SOUND["ft"])
     (left_out,) = [f for f in check_record(mixed, BENCH).findings if f.kind == "mixed_rows"]
     assert left_out.light == "red" and "--keep-rows" in left_out.remedy
+
+
+def with_a_pause(seconds, turned=()):
+    """Return two runs of one bench with a pause of the recorder between them."""
+    second = rsea.simulate(BENCH, 15.0 * np.random.default_rng(2).standard_normal(4200), rate=280.0)
+    channels = {}
+    for n, c in SOUND.channels.items():
+        y = -second[n].y if n in turned else second[n].y
+        channels[n] = Channel(np.r_[c.t, second[n].t + SOUND.stop + seconds], np.r_[c.y, y])
+    return SOUND.with_channels(**channels)
+
+
+@pytest.mark.parametrize("seconds", [20.0, 45.0, 590.0])
+def test_a_pause_of_the_recorder_is_one_line_and_convicts_nobody(seconds):
+    """Five red `dropped samples`, and `sign` by the straight line that was drawn through the pause."""
+    findings = check_record(with_a_pause(seconds), BENCH)
+    (pause,) = [f for f in findings.findings if f.light != "green"]
+    assert (pause.light, pause.kind, pause.channel, pause.unit) == ("amber", "pause", "", "s")
+    assert pause.value == pytest.approx(seconds, abs=0.01)
+    assert "nothing recorded from 15 s to" in pause.detail and "begins anew" in pause.detail
+    again, faults = repair_stamps(with_a_pause(seconds))
+    assert [f.kind for f in faults] == ["pause"]
+    assert repair_stamps(replace(again, faults=tuple(faults)))[1] == []
+
+
+def test_behind_a_pause_of_an_hour_the_simulation_begins_anew():
+    """It passed for a clock that was set, and the second run went on from the first: 2.7 times the noise."""
+    record, faults = repair_stamps(with_a_pause(3600.0))
+    assert {f.kind for f in faults} == {"clock_jump", "pause"}
+    sound, both = rsea.predict(BENCH, SOUND), rsea.predict(BENCH, record)
+    for n in ("ft", "position", "velocity"):
+        assert both[n].rms_error == pytest.approx(sound[n].rms_error, rel=0.1)
+
+
+def test_what_differs_behind_a_pause_is_told_with_its_times():
+    findings = check_record(with_a_pause(45.0, turned=("ft",)), BENCH)
+    (sign,) = [f for f in findings.findings if f.light == "red"]
+    assert (sign.kind, sign.channel) == ("sign", "ft") and "from 60 s to 75 s" in sign.detail
+
+
+def test_a_stop_of_the_recorder_for_less_is_lost_rows():
+    faults = repair_stamps(with_a_pause(1.0))[1]
+    assert {f.kind for f in faults} == {"dropped_samples"} and len(faults) == 5
 
 
 H, ROWS = 1 / 280, 2800

@@ -100,19 +100,8 @@ def check_size(rows: int, columns: int) -> None:
 
 FACTORS: Mapping[str, Mapping[str, float]] = {
     "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0},
-    "angle": {
-        "rad": 1.0,
-        "mrad": 1e-3,
-        "deg": math.pi / 180,
-        "arcmin": math.pi / 10800,
-        "rev": 2 * math.pi,
-    },
-    "angular velocity": {
-        "rad/s": 1.0,
-        "deg/s": math.pi / 180,
-        "rev/s": 2 * math.pi,
-        "rpm": 2 * math.pi / 60,
-    },
+    "angle": {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180, "arcmin": math.pi / 10800, "rev": 2 * math.pi},
+    "angular velocity": {"rad/s": 1.0, "deg/s": math.pi / 180, "rev/s": 2 * math.pi, "rpm": 2 * math.pi / 60},
     "torque": {"N m": 1.0, "mN m": 1e-3, "N mm": 1e-3, "N cm": 1e-2, "kN m": 1e3},
     "length": {"m": 1.0, "mm": 1e-3, "um": 1e-6},
     "velocity": {"m/s": 1.0, "mm/s": 1e-3},

@@ -16,6 +16,7 @@ import numpy as np
 from scipy.linalg import lstsq
 
 from msg_adapters.tables.column_table import CHANNELS, FACTORS, LINEAR, Table, Wanted, canonical, unit
+from msg_adapters.tables.importing import without_wraps
 from msg_adapters.tables.raw_codes import raw_code
 from msg_adapters.tables.text_file import column_names, read_text, seconds_of
 from rsea_ros.errors import ImportMapError
@@ -41,7 +42,7 @@ _YAML = {"y", "n", "yes", "no", "on", "off", "true", "false", "null"}
 """Words that YAML takes for values."""
 _SHORT = {"nm": "N m", "mnm": "mN m", "ma": "mA", "a": "A", "degps": "deg/s", "radps": "rad/s", "sec": "s"}
 """Units as names of columns write them."""
-_CURRENT, _TORQUE = re.compile("curr|amp|_i_|_iq_|_i_q"), re.compile("tau|torque|effort|load")
+_CURRENT, _TORQUE = re.compile("curr|(?<!st)amp|_i_|_iq_|_i_q"), re.compile("tau|torque|effort|load")
 _RATES = 3.0, 50_000.0
 """Hz, that a log has."""
 _SAME, _FACTOR = 0.9, 0.05
@@ -72,7 +73,8 @@ def guess_map(path: str | Path) -> str:
 
 def _lines(table: Table, units: Mapping[str, str]) -> Iterator[str]:
     """Yield the lines of a map but the first. units: by column what a row of the file says."""
-    numbers = {name: table[name] for name in units if name in table.columns and _moves(table[name])}
+    held = {name: table[name] for name in units if name in table.columns}
+    numbers = {n: y for n, y in held.items() if np.isfinite(y).sum() > 2 and np.nanmax(y) > np.nanmin(y)}
     stated = {name: _unit_in(name, text) for name, text in units.items()}
     yield "# A `?` asks for what the file does not say. Units:"
     yield from (f"#   {dimension}: {', '.join(names)}" for dimension, names in FACTORS.items())
@@ -105,10 +107,6 @@ def _lines(table: Table, units: Mapping[str, str]) -> Iterator[str]:
             yield f"# not used: {_quoted(name)}, {_range(table[name])}"
 
 
-def _moves(values: FloatArray) -> bool:
-    return bool(np.isfinite(values).sum() > 2 and np.nanmax(values) > np.nanmin(values))
-
-
 def _range(values: FloatArray) -> str:
     return f"{np.nanmin(values):.5g} to {np.nanmax(values):.5g}"
 
@@ -139,7 +137,7 @@ def _time(
     numbers: Mapping[str, FloatArray], dated: frozenset[str], stated: Mapping[str, str]
 ) -> tuple[str, float, str]:
     """Return the column of the stamps, the median s between them, and the map's line."""
-    steps = {name: np.diff(y) for name, y in numbers.items()}
+    steps = {name: np.diff(without_wraps(y)[0]) for name, y in numbers.items()}
     rising = {name: float(np.median(d)) for name, d in steps.items() if d.min() >= 0.0 < np.median(d)}
     named = [name for name in rising if _TIMES.search(_words(name)) or stated[name] in FACTORS["time"]]
     for name in named or [name for name in rising if np.ptp(steps[name]) < rising[name]]:

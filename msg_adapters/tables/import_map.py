@@ -1,19 +1,6 @@
-"""Import maps: which column of a foreign file is which channel, and in which unit.
+"""Import maps: which column of a foreign file is which channel, in which unit; docs/import.md has examples.
 
-about: one line that goes into the bag's notes
-time: {column: t, unit: s}                    # or {rate: 1000} (Hz) without stamps, or set_points at rest
-where: {column: test_nr, below: 100}          # optional: only these rows; also from:, equals: (a text, too)
-runs: {column: episode_index}                 # optional: a file of several runs, one for each value
-delimiter: ";"                                # optional: text files only, else seen from the first line
-header: false                                 # optional: text files only, else seen from the first line
-decimal: ","                                  # optional: text files only, else a point
-channels:
-  position: {column: phi, unit: deg, sign: -1}
-  velocity: {file: states.csv, column: "rates[2]", unit: rad/s}   # of a file in the directory that is read
-  command:                                    # a list is summed
-    - {column: vir, unit: V, scale: 35.15}    # N m for each V
-    - {column: pulses, unit: N m, constant: 0.5}
-  motor_torque: {expression: "0.12 * iq - 0.4 * sign(derivative(phi))", unit: N m}
+A list of terms is summed: `command: [{column: vir, unit: V, scale: 35.15}, {column: pulses, unit: N m}]`.
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 from pathlib import Path
 
@@ -19,6 +19,7 @@ from rsea_ros.documents.units import in_motion, plain
 from rsea_ros.documents.wording import list_names, quote
 from rsea_ros.errors import ImportMapError
 from rsea_ros.records.record import COMMANDS, IMPORTED, UNITS, BoolArray, Channel, Fault, FloatArray, Record
+from rsea_ros.records.stamp_order import GAP, jumps_back
 from rsea_ros.records.stamps import even_behind_ticks
 
 SET_POINTS = (
@@ -113,7 +114,7 @@ def import_records(
     tables = {name: _table(file, name, maps) for name, file in files.items()}
     for index, joint in zip(indices, maps, strict=True):
         for run in _runs(path, tables, joint):
-            parts = [_part(files[name], table, joint.of_file(name), run) for name, table in tables.items()]
+            parts = [p for name in tables for p in _parts(files[name], tables[name], joint, name, run)]
             with _name_errors(path, mapping, run):
                 record = _record(path, parts, joint)
             yield Imported(record, joint, index, run)
@@ -160,17 +161,45 @@ def _runs(
     return [str(run) if runs.dtype.kind == "U" else float(run) for run in runs]
 
 
-def _part(path: Path, table: Table, mapping: ImportMap, run: float | str | None) -> _Part:
+def _parts(
+    path: Path, table: Table, mapping: ImportMap, file: str, run: float | str | None
+) -> Iterator[_Part]:
+    """Yield what one file holds, by streams: an outer join of several is as many tables."""
+    mapping = mapping.of_file(file)
     with _name_errors(path, mapping, run):
         keep, undated = _rows_kept(table, mapping, run)
-        stamps, repeats = _stamps(path, table, mapping, keep)
         codes = [f for name, terms in mapping.channels.items() for f in _codes(name, table, terms, keep)]
-        raw = {fault.channel for fault in codes}
-        if raw == mapping.channels.keys():
+        kept = {n: terms for n, terms in mapping.channels.items() if n not in {f.channel for f in codes}}
+        if not kept:
             raise ImportMapError(f"no channel is left: {codes[0].channel}: {codes[0].detail}")
-        kept = {name: terms for name, terms in mapping.channels.items() if name not in raw}
-        values = {name: _values(table, terms, keep, stamps) for name, terms in kept.items()}
-    return _Part(stamps, values, table.notes, (*_rows_left_out(path, table, undated), *repeats, *codes))
+        streams = _streams(table, kept, keep) if mapping.time else [(tuple(kept), np.ones_like(keep))]
+        notes, faults = table.notes, (*_rows_left_out(path, table, undated), *codes)
+        if len(streams) > 1:
+            of = "; ".join(", ".join(names) for names, _ in streams)
+            notes += (f"{len(streams)} streams, each in rows of its own: {of}",)
+        for names, rows in streams:
+            columns = [column for name in names for term in kept[name] for column in term.columns]
+            at, stamps, counters, repairs = _stamps(path, table, mapping, keep & rows, rows, columns)
+            values = {name: _values(table, kept[name], at, stamps) for name in names}
+            yield _Part(stamps, values, (*notes, *counters), (*faults, *repairs))
+            notes, faults = (), ()
+
+
+def _streams(
+    table: Table, channels: Mapping[str, Sequence[ChannelTerm]], keep: BoolArray
+) -> list[tuple[tuple[str, ...], BoolArray]]:
+    """Return the channels that share at least half of their rows, and the rows in which one has a value.
+
+    A cell is missing only where the row holds another of its stream; without another stream, in any row.
+    """
+    streams: list[tuple[tuple[str, ...], BoolArray]] = []
+    for name, terms in channels.items():
+        own = keep & np.logical_and.reduce([table.given(column) for term in terms for column in term.columns])
+        same = [s for s in streams if 2 * np.sum(s[1] & own) >= min(np.sum(s[1]), np.sum(own)) - 1]
+        names = (*(n for s in same for n in s[0]), name)
+        streams = [s for s in streams if s[0][0] not in names]
+        streams.append((names, np.logical_or.reduce([own, *(rows for _, rows in same)])))
+    return streams if len(streams) > 1 else [(tuple(channels), np.ones_like(keep))]
 
 
 def _codes(name: str, table: Table, terms: Sequence[ChannelTerm], keep: BoolArray) -> Iterator[Fault]:
@@ -231,7 +260,7 @@ def summary(record: Record, mapping: ImportMap) -> list[str]:
     if record.driving is None and not mapping.set_points:
         lines.append(
             "no command: `check` compares the channels; for `identify` and `diagnose` map the commanded"
-            " torque or current as `command`, or the measured one where no other was logged"
+            " torque or current as `command`, or the measured one where no other was logged (docs/import.md)"
         )
     return lines
 
@@ -287,10 +316,9 @@ def _held(table: Table, where: RowFilter) -> str:
 
 
 def _rows_left_out(path: str | Path, table: Table, undated: int) -> Iterator[Fault]:
-    no_stamp = "no stamp, or no value to choose rows by"
-    for count, reason in ((table.left_out, table.first), (undated, no_stamp)):
+    for count, why in ((table.left_out, table.first), (undated, "no stamp, or no value to choose rows by")):
         if count:
-            detail = f"{count} of {table.rows} rows left out: {reason}"
+            detail = f"{count} of {table.rows} rows left out: {why}"
             yield Fault("rows_left_out", Path(path).name, count / table.rows, detail)
 
 
@@ -301,27 +329,44 @@ def _channel(
     if np.isinf(y).any():
         raise ImportMapError(f"{name}: {columns} is too large for its unit, expected a number below 1e308")
     missing = np.isnan(y)
-    count = int(np.count_nonzero(missing))
-    if not count:
-        return Channel(t, y), []
-    if len(y) - count < 2:
-        raise ImportMapError(f"{name}: {columns} has {len(y) - count} values, expected a number in most rows")
-    first = float(t[np.argmax(missing)])
-    detail = f"{count} of {len(y)} values of {columns} are missing, the first at {first:.6g} s"
-    return Channel(t[~missing], y[~missing]), [Fault("missing_values", name, count / len(y), detail)]
+    channel = Channel(t[~missing], y[~missing])
+    if len(channel) < 2:
+        raise ImportMapError(f"{name}: {columns} has {len(channel)} values, expected a number in most rows")
+    count, first = int(missing.sum()), float(t[np.argmax(missing)])
+    if count > _MOST * len(y):
+        count, first = _lacking(channel.t, t) or (count, first)
+    whole = len(channel) + count
+    detail = f"{count} of {whole} values of {columns} are missing, the first at {first:.6g} s"
+    return channel, [Fault("missing_values", name, count / whole, detail)] if count else []
+
+
+_MOST, _OFTEN = 0.4, 0.02
+"""Share of empty cells above which a column may be that of a slower sensor, and of its steps, or its values,
+that such a one lacks without being told, at the most."""
+
+
+def _lacking(t: FloatArray, rows: FloatArray) -> tuple[int, float] | None:
+    """Return how many values a column lacks that has some evenly (t) among rows, and from when on, s."""
+    step = np.diff(t, prepend=rows[0], append=rows[-1])
+    period = float(np.median(step))
+    if np.mean(step > GAP * period) > _OFTEN:
+        return None
+    count, begins = int((rows[-1] - rows[0]) / period) - len(t), np.append(rows[0], t)
+    return (count if count > _OFTEN * len(t) else 0), float(begins[np.argmax(step > GAP * period)])
 
 
 def _stamps(
-    path: Path, table: Table, mapping: ImportMap, keep: BoolArray
-) -> tuple[FloatArray, list[Fault]]:
-    """Return the stamp of each valid row, s, increasing, and the fault of stamps that repeat.
+    path: Path, table: Table, mapping: ImportMap, keep: BoolArray, rows: BoolArray, columns: Sequence[str]
+) -> tuple[np.ndarray, FloatArray, list[str], list[Fault]]:
+    """Return the valid rows in order, their stamps, s, increasing, notes, and faults of the stamps.
 
     Stamps that repeat are spread over all dated rows of a run, those that `where` leaves out included.
+    rows, columns: of the stream.
     """
     if mapping.time is None:
         start = int(np.argmax(keep)) if mapping.runs is not None else 0
-        return (np.flatnonzero(keep) - start) / float(mapping.rate or 1.0), []
-    whole = np.logical_and.reduce([~np.isnan(table[column]) for column in mapping.time.columns])
+        return np.flatnonzero(keep), (np.flatnonzero(keep) - start) / float(mapping.rate or 1.0), [], []
+    whole = np.logical_and.reduce([rows, *(~np.isnan(table[column]) for column in mapping.time.columns)])
     for labels in [mapping.runs] if mapping.runs is not None else []:
         whole &= table.values(labels) == table.values(labels)[np.argmax(keep)]
     if table.trials is not None:
@@ -331,21 +376,52 @@ def _stamps(
             f"time.unit is {mapping.time.unit!r}, and {mapping.time.column} holds date-times, expected s"
         )
     dated = np.flatnonzero(whole)
-    t = _values(table, (mapping.time,), whole, dated.astype(np.float64))
-    back = np.flatnonzero(np.diff(t) < 0)
-    if back.size:
-        at = back[0] + 1
+    counted = {column: without_wraps(table[column][dated]) for column in mapping.time.columns}
+    ticks = replace(table, columns={column: x for column, (x, _) in counted.items()})
+    t = _values(ticks, (mapping.time,), np.arange(len(dated)), dated.astype(np.float64))
+    notes = [f"{column} {note}" for column, (_, note) in counted.items() if note]
+    faults = []
+    if (jumps := np.flatnonzero(jumps_back(t)) + 1).size:
+        at, starts = jumps[0], ", ".join(str(dated[k] + 1) for k in jumps[:_MOST_NAMED])
         steps = f"{t[at]:.6f} s after {t[at - 1]:.6f} s"
-        raise ImportMapError(f"{mapping.time.column} of row {dated[at] + 1} goes back ({steps})")
+        raise ImportMapError(
+            f"{mapping.time.column} of row {dated[at] + 1} goes back ({steps}), expected one run: make a file"
+            f" of the rows from {starts} on, or name the column that numbers the runs, `runs: {{column: …}}`"
+        )
+    if (back := np.diff(t) < 0.0).any():
+        order = np.argsort(t, kind="stable")
+        rough = [[np.nansum(np.abs(np.diff(table[c][k], 2))) for c in columns] for k in (dated[order], dated)]
+        smooth = sum(new / old - 1.0 for new, old in zip(*rough, strict=True) if old) <= 0.0
+        what = "rows sorted by them" if smooth else "the stamps alone are sorted, the values are in order"
+        detail = f"{back.sum()} of {len(t)} stamps go back, the first at {t[1:][back][0]:.6g} s: {what}"
+        faults.append(Fault("out_of_order", path.name, float(back.mean()), detail))
+        dated, t = dated[order] if smooth else dated, t[order]
     if t[-1] == t[0]:
         raise ImportMapError(f"{mapping.time.column} is {t[0]:g} s in every row, expected a clock that runs")
     spread, detail = spread_repeats(t)
-    share = float(np.mean(np.diff(t, prepend=-np.inf) == 0.0))
-    faults = [Fault("coarse_stamps", path.name, share, detail)] if detail else []
-    return spread[keep[dated]], faults
+    share, inside = float(np.mean(np.diff(t, prepend=-np.inf) == 0.0)), keep[dated]
+    faults += [Fault("coarse_stamps", path.name, share, detail)] if detail else []
+    return dated[inside], spread[inside], notes, faults
 
 
-def _values(table: Table, terms: Sequence[ChannelTerm], keep: BoolArray, t: FloatArray) -> FloatArray:
+_COUNTERS, _NEAR = [2.0**bits * 10.0**-places for bits in (16, 32) for places in (0, 3, 6, 9)], 5.0
+"""Where counters of 16 and 32 bits begin anew, also of ms, µs, ns made s; usual steps that they go then."""
+
+
+def without_wraps(x: FloatArray) -> tuple[FloatArray, str]:
+    """Return stamps as the counter without an end would have them, and a note on one that began anew."""
+    step = np.diff(x, prepend=x[0])
+    usual = float(np.median(step[step > 0.0])) if np.any(step > 0.0) else 0.0
+    for span in _COUNTERS if np.any(step < 0.0) else ():
+        turns = np.rint(step / span)
+        turns[np.abs(step - turns * span) > _NEAR * usual] = 0.0
+        if np.any(turns < 0.0) and np.ptp(x) <= span:
+            note = f"begins anew at {span:.10g}, as a counter does ({np.sum(turns < 0.0)} times): unwrapped"
+            return x - span * np.cumsum(turns), note
+    return x, ""
+
+
+def _values(table: Table, terms: Sequence[ChannelTerm], keep: np.ndarray, t: FloatArray) -> FloatArray:
     """Return a channel in the rows that count. t: their stamps, s. Raises ValueError for an expression."""
     total = np.zeros(len(t))
     with np.errstate(over="ignore", invalid="ignore"):

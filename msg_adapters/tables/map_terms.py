@@ -12,8 +12,8 @@ from typing import Any
 
 from msg_adapters.tables.child import choose_element
 from msg_adapters.tables.column_table import CHANNELS, FACTORS, LINEAR, unit
-from msg_adapters.tables.expression import FUNCTIONS, Expression, parse
-from rsea_ros.documents.strict_yaml import NEEDED, Key, table
+from msg_adapters.tables.expression import Expression, parse
+from rsea_ros.documents.strict_yaml import NEEDED, Key
 from rsea_ros.documents.wording import list_names, quote
 from rsea_ros.errors import FieldError
 
@@ -63,37 +63,7 @@ TERM = (
     Key("constant", "number, or one each joint, SI unit", "0", "added after scale and sign"),
     Key("held", "`true`, `false`", "false", "rows repeat a value until the next one arrives: keep the first"),
 )
-_MEANINGS = {
-    "command": "commanded motor torque at the gear output; it takes effect at its stamp",
-    "motor_torque": "motor torque from the measured current, at the gear output",
-    "ft": "F/T sensor about the joint's axis, positive when the spring pushes the distal side forward",
-    "deflection": "angle of the spring from its own encoder, with the sign of `ft`",
-    "position": "angle of the gear output relative to the housing",
-    "velocity": "rate of `position`",
-    "reference": "target position of a controller that was active during the record",
-    "reference_velocity": "target velocity of a MIT frame",
-}
-CHANNEL = tuple(Key(name, dimension, "not measured", _MEANINGS[name]) for name, dimension in CHANNELS.items())
-SECTIONS: Mapping[str, Sequence[Key]] = {
-    "map": MAP,
-    "time": TIME,
-    "where": WHERE,
-    "runs": RUNS,
-    "channels": CHANNEL,
-    "channels.NAME": TERM,
-}
-
-
-def tables() -> str:
-    """Return the tables of docs/import.md in Markdown: all keys, all units, the functions of expressions."""
-    rows = [f"| {name} | {', '.join(f'`{unit}`' for unit in factors)} |" for name, factors in FACTORS.items()]
-    units = "\n".join(["| dimension | units |", "|---|---|", *rows])
-    calls = [f"| `{name}({', '.join('xyz'[:n])})` | {says} |" for name, (_, n, says) in FUNCTIONS.items()]
-    functions = "\n".join(["| function | is |", "|---|---|", *calls])
-    sections = (table(section, keys) for section, keys in SECTIONS.items())
-    return "\n".join([*sections, units, "", functions]) + "\n"
-
-
+CHANNEL = tuple(Key(name, dimension, "not measured") for name, dimension in CHANNELS.items())
 PER_JOINT = {"sign": 1, "scale": 1, "constant": 0}
 """Keys that may have a number for each joint, and their values where they are left out."""
 LARGEST = 1e300

@@ -97,12 +97,8 @@ def split(line: str, delimiter: str) -> list[str]:
     return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter, skipinitialspace=True), [])]
 
 
-def index_in(column: str, names: Sequence[str]) -> int:
-    """Return where a column stands, by its name or its number, from 1. Raises ValueError for neither."""
-    return int(column) - 1 if _is_number(column, names) else index_of(column, names)
-
-
 def _is_number(column: str, names: Sequence[str]) -> bool:
+    """Return whether a column is asked for by its number, from 1."""
     return column not in names and column.isdecimal() and 1 <= int(column[:6]) <= len(names)
 
 
@@ -122,9 +118,10 @@ def layout_of(
     known = sorted(dict.fromkeys((usual, "\t", ";", ",", "|", BLANKS)), key=lambda one: one == wanted.decimal)
     tried = [wanted.delimiter] if wanted.delimiter else known
     layouts = [_layout(lines, one, wanted) for one in tried]
-    for layout in (one for one in layouts if not one.headed):
-        for line, one in product(reversed(comments), known):  # as numpy.savetxt(header=…) writes them
-            named = TextLayout(layout.delimiter, tuple(split(line.lstrip(" \t#%"), one)), False)
+    above = [text for line in reversed(comments) for text in (line.lstrip(" \t#%"), line)]
+    for layout in (one for one in layouts if not one.headed or any(map(is_decimal, one.names))):
+        for line, one in product(above, known):  # as numpy.savetxt(header=…), rostopic write them
+            named = TextLayout(layout.delimiter, tuple(split(line, one)), False)
             if len(named.names) == len(layout.names) and all(_names(named, column) for column in columns):
                 return 0, named
     for layout in sorted(layouts, key=lambda layout: layout.headed):
@@ -296,7 +293,8 @@ class _Reader:
         self._decimal, self._labels, self._stamps = wanted.decimal, wanted.labels, wanted.stamps
         self._dated: set[str] = set()
         places = {column: base_and_index(column, layout.names) for column in wanted.columns}
-        self._indices = {c: index_in(base, layout.names) for c, (base, _) in places.items()}
+        by = {c: (base, _is_number(base, layout.names)) for c, (base, _) in places.items()}
+        self._indices = {c: int(b) - 1 if n else index_of(b, layout.names) for c, (b, n) in by.items()}
         self._elements = {column: element for column, (_, element) in places.items()}
         self._has_lists = any(element is not None for element in self._elements.values())
         self._parts: dict[str, list[FloatArray | Labels]] = {column: [] for column in self._indices}

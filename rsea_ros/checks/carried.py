@@ -79,8 +79,8 @@ def _rises_rarely(channel: Channel) -> bool:
 
 
 _AGAIN = ("missing_topic", "frozen_samples", "dropped_samples", "duplicate_stamps", "clock_jump", "outliers",
-          "clipping", "nan", "coarse_steps", "early_torque", "held_samples",
-          "mixed_rows", "rounded_stamps")  # fmt: skip
+          "clipping", "nan", "coarse_steps", "early_torque", "held_samples", "interpolated",
+          "mixed_rows", "pause", "rounded_stamps")  # fmt: skip
 """Faults that the diagnosis finds and masks itself."""
 
 

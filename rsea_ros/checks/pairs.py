@@ -30,6 +30,7 @@ from rsea_ros.errors import RseaError
 from rsea_ros.model.equations import Mechanics, gear_inertia, mechanics
 from rsea_ros.model.rig import Rig
 from rsea_ros.records.record import Channel, ComplexArray, FloatArray, Record
+from rsea_ros.records.stamps import recorder_pauses
 from rsea_ros.records.statistics import running_integral
 
 REACH = 2.0
@@ -219,7 +220,7 @@ def each_pair(record: Record, rig: Rig) -> Iterator[Pair]:
     for law in asked:
         if law not in kept:
             with np.errstate(all="ignore"):
-                kept[law] = _parts(_behind_all(record, law, rig), law)
+                kept[law] = _between_pauses(_behind_all(record, law, rig), law)
         yield from kept[law]
 
 
@@ -239,6 +240,21 @@ def _behind_all(record: Record, law: Law, rig: Rig) -> Record:
 def _kept(asked: tuple[Law, ...], content: bytes) -> dict[Law, list[Pair]]:
     """Return where the pairs of a record are kept by law, for all its laws and its content."""
     return {}
+
+
+def _between_pauses(record: Record, law: Law) -> list[Pair]:
+    """Return the parts of a law beside each pause of the recorder: one, where they say the same."""
+    begin, end = recorder_pauses(record)
+    if not len(begin):
+        return _parts(record, law)
+    spans = zip((-math.inf, *end), (*np.nextafter(begin, math.inf), math.inf), strict=True)
+    recorded = [record.between(a, b) for a, b in spans]
+    names = (law.y, law.x, law.less or law.y)
+    found = [p for r in recorded if all(len(r[n]) > 1 for n in names) for p in _parts(r, law)]
+    if not found or not all(_agree(p, found[0]) for p in found):
+        return found
+    best = max(found, key=lambda p: (p.fits and p.clear, p.stop - p.start))
+    return [replace(best, start=found[0].start, stop=found[-1].stop)]
 
 
 def _parts(record: Record, law: Law) -> list[Pair]:

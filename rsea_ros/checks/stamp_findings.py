@@ -29,14 +29,15 @@ _SLOW = 0.6
 """Of the command's rate: a slower sensor folds what is above its Nyquist frequency."""
 _LEFT_OUT, _MUCH = ("mixed_rows", "stray_stamps"), 0.02
 """Faults whose rows are left out for their stamps, and the share of them that is red."""
-_OF_ALL = ("missing_topic", "coarse_steps", "coarse_stamps", "rounded_stamps", "clock_jump",
-           "partly_recorded", "early_torque", "held_samples", "mixed_rows")  # fmt: skip
+_OF_ALL = ("missing_topic", "coarse_steps", "coarse_stamps", "rounded_stamps", "clock_jump", "pause",
+           "partly_recorded", "early_torque", "held_samples", "interpolated", "mixed_rows")  # fmt: skip
 """Faults of a whole channel, whose share of its samples means nothing."""
 _MENDED = ("early_torque",)
 """Faults that leave no doubt in a result once they are mended."""
 _REMEDIES = {
     "missing_topic": "record it, or name its topic with --topic",
     "frozen_samples": "look at the sensor's driver: it repeats its last value",
+    "interpolated": "log it as it arrives, without resampling; the samples between are left out",
     "held_samples": "log it as it arrives; the repeats are left out",
     "dropped_samples": "record with a deeper queue, on a quieter machine",
     "coarse_stamps": "log stamps as fine as the samples",
@@ -44,6 +45,7 @@ _REMEDIES = {
     "partly_recorded": "start the recorder first and stop it last, or cut the run with --from and --to",
     "unnamed_file": "remove it, or give its own name to read it",
     "duplicate_stamps": "stamp at acquisition, not on arrival",
+    "pause": "nothing to do, unless the zero of a sensor moved meanwhile: then cut the record there",
     "mixed_rows": "keep the clocks from being set during a run; --keep-rows leaves these rows in",
     "stray_stamps": "look at the clock; --keep-rows leaves these rows in",
     "clock_jump": "keep the clocks from being set during a run",

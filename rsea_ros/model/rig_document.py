@@ -21,7 +21,6 @@ from rsea_ros.documents.strict_yaml import (
     sequence,
     spread,
     switch,
-    table,
     text,
     unit,
 )
@@ -50,28 +49,6 @@ from rsea_ros.model.train import PARTS, TRAINS
 from rsea_ros.records.record import MEASURED, UNITS
 
 T = TypeVar("T")
-_END = {
-    "inertia": "inertia of the load",
-    "damping": "viscous damping of the load",
-    "stiffness": "stiffness to ground",
-    "gravity": "m g l of a pendulum: the largest gravity torque",
-    "gravity_angle": "angle of the pendulum from hanging, at position zero",
-}
-_MEANINGS = {
-    "rotor.reflected_inertia": "rotor inertia, reflected to the gear output",
-    "rotor.reflected_damping": "viscous damping of motor and gear, reflected to the gear output",
-    "gear.ratio": "turns of the motor for one turn of the output",
-    "gear.stiffness": "stiffness of the gear train",
-    "gear.damping": "damping of a gear train that gives",
-    "chassis.inertia": "inertia of the spring chassis, which turns with the gear output",
-    "spring.stiffness": "stiffness of the spring; required unless it is rigid",
-    "spring.damping": "damping of the spring",
-    "housing.inertia": "inertia of the housing, if a proximal spring holds it",
-    "proximal_spring.stiffness": "stiffness between the housing and its end",
-    "proximal_spring.damping": "damping of that spring",
-    **{f"{end}.{key}": meaning for end in END_NAMES for key, meaning in _END.items()},
-    "spring_end.above_sensor": "share of its inertia between the spring and the F/T sensor",
-}  # fmt: skip
 _TRAINS = ", ".join(f"`{train}`" for train in TRAINS)
 GROUPS = sorted({name.split(".")[0] for name in FIELDS} - {"controller"})
 SWITCHES: Mapping[str, Sequence[Key]] = {
@@ -130,18 +107,6 @@ CLOCK = (
 )
 CLOCK_RATE = (Key("value", "number", NEEDED), Key("unit", "ppm", NEEDED))
 LOOP_KIND = Key("kind", ", ".join(f"`{k}`" for k in LOOP_FIELDS), NEEDED, "kind of the position loop")
-_LOOP_MEANINGS = {
-    "k_p": "torque per error: u = k_p e + k_i int e dt - k_d dq/dt + k_f dr/dt",
-    "k_i": "torque per integral of the error",
-    "k_d": "damping torque per speed",
-    "k_f": "feed-forward torque per speed of the target",
-    "k_pos": "desired speed per error: u = k_v e_v + k_vi int e_v dt, e_v = k_pos e - dq/dt",
-    "k_v": "torque per error of the speed",
-    "k_vi": "torque per integral of the speed error",
-    "torque_limit": "largest torque",
-    "velocity_limit": "largest speed of the target (pd), largest desired speed (cascade)",
-    "sample_time": "sample period of the firmware; 0: continuous",
-}
 CONTROLLER = (
     Key("k_p", "1/s, >= 0", NEEDED, "command = k_v (k_p (reference - q) - dq/dt)"),
     Key("k_v", "N·m·s/rad, >= 0", NEEDED),
@@ -162,45 +127,6 @@ CONDITION = (
     Key("separate", "list of values with a spread", "none", "fitted for this record alone, from the rig's"),
     Key("without", "list of effects", "none", "act in the other records only, be they stated or found"),
 )
-
-
-def tables() -> str:
-    """Return the tables of docs/rig.md in Markdown."""
-    parts = [table("rig", TOP)]
-    for group in GROUPS:
-        fields = [(name, field) for name, field in FIELDS.items() if name.startswith(f"{group}.")]
-        parts.append(table(group, [*(_key(name, field) for name, field in fields), *SWITCHES.get(group, ())]))
-    parts.append(table("sensors.CHANNEL", SENSOR))
-    channels = ", ".join(f"`{n}` {plain(UNITS[n])}" for n in MEASURED)
-    parts.append(f"Channels and their units: {channels}.\n")
-    parts += [table("sensors.CHANNEL.clock", CLOCK), table("sensors.CHANNEL.filter", FILTER)]
-    parts += [_loop_table(kind) for kind in LOOP_FIELDS]
-    parts += [table("controller", CONTROLLER), table("effects[i]", EFFECT)]
-    parts += [table("conditions[i]", CONDITION), table("GROUP.FIELD", QUANTITY)]
-    return "\n".join(parts)
-
-
-def _loop_table(kind: str) -> str:
-    """Return the table of a position loop whose targets command the bench."""
-    keys = [(key, FIELDS[f"controller.{key}"]) for key in loop_names(kind)]
-    rows = [Key(key, *_expectation(field), _LOOP_MEANINGS[key]) for key, field in keys]
-    return table(f"controller, kind: {kind}", [LOOP_KIND, *rows])
-
-
-def _key(name: str, field: Field) -> Key:
-    expects, default = _expectation(field)
-    if name.endswith("_end.inertia"):
-        default = "required unless clamped"
-    return Key(name.split(".")[1], expects, default, _MEANINGS[name])
-
-
-def _expectation(field: Field) -> tuple[str, str]:
-    """Return the expected value of a field, and its default."""
-    bound = f", {'>=' if field.low_allowed else '>'} {field.low:g}" if math.isfinite(field.low) else ""
-    expects = f"{plain(field.unit) or 1}{bound}"
-    if field.default is None:
-        return expects, NEEDED
-    return expects, "infinite" if math.isinf(field.default) else f"{field.default:g}"
 
 
 _LATEST = 0.01

@@ -207,20 +207,52 @@ _MANY_STEPS = 4.0
 
 
 def without_held_samples(record: Record) -> tuple[Record, list[Fault]]:
-    """Return the record with the first sample of each value alone, where a sensor's log repeats it; faults.
+    """Return the record with the readings of a sensor alone, where its log repeats or joins them; faults.
 
-    A repeat is no measurement at its stamp: a fit takes it for a sensor that comes late.
+    A repeat, or a sample on a line, is no measurement at its stamp: a fit takes it for one that comes late.
     """
     arrived, faults = {}, []
-    for name in SENSED:
-        repeats = repeats_of(record[name].y) if name in record else 1
-        if repeats > 1:
-            new = _is_new(record[name].y)
-            arrived[name] = Channel(record[name].t[new], record[name].y[new])
-            share = 1.0 - len(arrived[name]) / len(record[name])
-            detail = f"the log repeats every value {repeats} times; the first of each is used"
-            faults.append(Fault("held_samples", name, share, detail, record[name].rate / repeats, "Hz"))
+    for name in (n for n in MEASURED if n in record):
+        channel, at = record[name], ends_of_lines(record[name].y)
+        if at is not None:
+            kind, rate = "interpolated", channel.rate * len(at) / len(channel)
+            detail = f"has straight lines over {len(channel) / len(at):.2g} samples; their ends are used"
+        elif name in SENSED and (repeats := repeats_of(channel.y)) > 1:
+            at, kind, rate = np.flatnonzero(_is_new(channel.y)), "held_samples", channel.rate / repeats
+            detail = f"repeats every value {repeats} times; the first of each is used"
+        else:
+            continue
+        arrived[name] = Channel(channel.t[at], channel.y[at])
+        faults.append(Fault(kind, name, 1.0 - len(at) / len(channel), f"the log {detail}", rate, "Hz"))
     return record.with_channels(**arrived), faults
+
+
+_STRAIGHT, _LINES, _SIZES, _NEARLY_ALL = 0.05, 0.4, 8, (0.9, 0.95)
+"""Of the usual bend: less is straight. At least: share of the samples that are so, different sizes of bends
+(in as many steps of the usual one), share of what is straight that rises, of lines of about one length."""
+
+
+def ends_of_lines(values: FloatArray) -> IntArray | None:
+    """Return the samples between which a log has lines, as a resampled one has; else None.
+
+    The readings at their ends have noise: bends of many sizes. Those of an encoder at a constant speed, or of
+    a motion without noise, have few. Where a line is as long as several, ends that hardly bend lie on it.
+    """
+    if len(values) < _FEWEST_VALUES or not np.isfinite(values).all():
+        return None
+    bend = np.abs(np.diff(slope := np.diff(_scale(values))))
+    usual = float(np.quantile(bend, 0.95))
+    straight, rises = bend < _STRAIGHT * usual, np.abs(slope[1:]) > _STRAIGHT * usual
+    if np.count_nonzero(straight) <= _LINES * len(bend) or np.mean(rises[straight]) < _NEARLY_ALL[0]:
+        return None
+    ends = ~straight & (bend >= np.append(0.0, bend[:-1])) & (bend > np.append(bend[1:], 0.0))
+    at = np.concatenate([[0], 1 + np.flatnonzero(ends), [len(values) - 1]])
+    length, sizes = np.diff(at) / np.median(np.diff(at)), np.unique(np.rint(_SIZES * bend[~straight] / usual))
+    if len(sizes) < _SIZES or np.mean(np.abs(np.log2(length)) <= 1.0) < _NEARLY_ALL[1]:
+        return None
+    lines = np.where(np.abs(length - np.rint(length)) < 0.1, np.rint(length), 1.0).astype(np.int64)
+    each = np.interp(np.arange(lines.sum() + 1), np.append(0, np.cumsum(lines)), at)
+    return np.unique(np.rint(each).astype(np.int64))
 
 
 def repeats_of(values: FloatArray) -> int:

@@ -175,26 +175,55 @@ def repair_stamps(record: Record) -> tuple[Record, list[Fault]]:
     record, shared = _without_long_pauses(record)
     record, mixed = without_mixed_rows(record)
     faults += [*shared, *mixed]
-    channels = {}
+    channels, taken_out = {}, {}
     for name, channel in record.channels.items():
-        channel, jumps = _without_jumps(channel, name, _expected_span(record, name), _pauses(record, name))
+        channel, jumps = _without_jumps(record, name)
         channel, disorder = stamp_order.sort_by_stamp(channel, name, record.keeps_rows)
         count = len(channel)
         channel, repeats = _without_repeats(channel, name)
         faults += [*jumps, *disorder, *repeats]
         _check_even(channel, f"{record.source}: {name}")
-        ordered = record.with_channels(**{name: channel})
-        pauses = holds.paused_steps(ordered, name) if name in COMMANDS else None
-        if not any(fault.kind == "coarse_stamps" for fault in repeats):  # else what looks like a gap is none
-            faults += stamp_order.dropped_samples(channel, name, count - len(channel), pauses)
         channels[name] = channel
-    repaired, held = holds.without_held_samples(record.with_channels(**channels))
+        if not any(fault.kind == "coarse_stamps" for fault in repeats):  # else what looks like a gap is none
+            taken_out[name] = count - len(channel)
+    ordered = record.with_channels(**channels)
+    stood = np.empty((2, 0)) if mixed else recorder_pauses(ordered)
+    for name, count in taken_out.items():
+        t = channels[name].t
+        pauses = holds.paused_steps(ordered, name) if name in COMMANDS else np.zeros(max(len(t) - 1, 0), bool)
+        at = np.searchsorted(t, stood[0], "right") - 1
+        pauses[at[(at >= 0) & (at < len(pauses))]] = True
+        faults += stamp_order.dropped_samples(channels[name], name, count, pauses)
+    repaired, held = holds.without_held_samples(ordered)
     repaired, _ = holds.with_held_commands(repaired)
     repaired, early = holds.behind_the_edge(repaired)
     faults += [*held, *early]
     explained = {fault.channel for fault in record.faults if fault.kind in _EXPLAIN_GAPS}
     new = [fault for fault in faults if fault.kind != "dropped_samples" or fault.channel not in explained]
+    new += () if any(fault.kind == "pause" for fault in record.faults) else _pause_faults(stood)
     return repaired, [*new, *(fault for fault in absent_spans(repaired) if fault not in record.faults)]
+
+
+_PAUSE = 2.0
+"""s. A recorder that stalls loses rows for less; whoever stops one and starts it again needs longer."""
+
+
+def recorder_pauses(record: Record) -> FloatArray:
+    """Return begin and end (s) of the times in which no channel has a sample, shape (2, n)."""
+    every = np.sort(np.concatenate([np.zeros(0), *(c.t for c in record.channels.values())]))
+    periods = [stamp_order.median_period(c.t) for c in record.channels.values() if len(c) > 1]
+    long = np.diff(every) > max(_PAUSE, _ABSENT_PERIODS * float(np.median(periods or [0.0])))
+    return np.array([every[:-1][long], every[1:][long]])
+
+
+def _pause_faults(pauses: FloatArray) -> Iterator[Fault]:
+    """Yield the fault of a recorder that paused. pauses: begin and end (s), shape (2, n)."""
+    lasts = pauses[1] - pauses[0]
+    if len(lasts):
+        begin, end = pauses[:, int(np.argmax(lasts))]
+        more = f" and {len(lasts) - 1} times more" if len(lasts) > 1 else ""
+        what = f"nothing recorded from {begin:.4g} s to {end:.4g} s{more}; the simulation begins anew behind"
+        yield Fault("pause", "", float("nan"), what, float(lasts.sum()), "s")
 
 
 def _without_repeats(channel: Channel, name: str) -> tuple[Channel, list[Fault]]:
@@ -246,65 +275,39 @@ def _check_even(channel: Channel, where: str) -> None:
 
 
 def _without_long_pauses(record: Record) -> tuple[Record, list[Fault]]:
-    """Leave out few samples far from all others; where all channels pause for too long, the clock was set."""
+    """Leave out few samples far from all others; shorten what is too long a pause of all, or a set clock."""
     faults: list[Fault] = []
-    channels = {}
-    for name, channel in record.channels.items():
-        channels[name], stray = _without_stray_parts(channel, name, record.keeps_rows)
-        faults += stray
-    periods = {name: _SHORTEST_JUMP * stamp_order.median_period(c.t) for name, c in channels.items()}
-    pauses = {
-        name: np.abs(np.diff(c.t)) > max(stamp_order.LONGEST_PAUSE, periods[name])
-        for name, c in channels.items()
-    }
+    channels = dict(record.channels)
+    for name, c in () if record.keeps_rows else record.channels.items():
+        if (stray := stamp_order.far_apart(c.t, stamp_order.LONGEST_PAUSE)).any():
+            channels[name] = Channel(c.t[~stray], c.y[~stray])
+            faults.append(stamp_order.stray_fault(stray, name))
+    least = {n: _SHORTEST_JUMP * stamp_order.median_period(c.t) for n, c in channels.items()}
+    longest = {n: max(stamp_order.LONGEST_PAUSE, period) for n, period in least.items()}
+    pauses = {n: np.abs(np.diff(c.t)) > longest[n] for n, c in channels.items()}
     if all(at.any() for at in pauses.values()):
         for name, at in pauses.items():
-            channels[name], jump = _shorten_steps(channels[name], name, at)
+            left = 2.0 * max(_PAUSE, 2.0 * max(least.values()))  # still a pause, behind which all begins anew
+            channels[name], jump = _shorten_steps(channels[name], name, at, left)
             faults += jump
     return record.with_channels(**channels), faults
 
 
-def _without_stray_parts(channel: Channel, name: str, keep: bool) -> tuple[Channel, list[Fault]]:
-    """Leave out the few samples that lie far from the others."""
-    stray = stamp_order.far_apart(channel.t, stamp_order.LONGEST_PAUSE)
-    if keep or not stray.any():
-        return channel, []
-    return Channel(channel.t[~stray], channel.y[~stray]), [stamp_order.stray_fault(stray, name)]
+def _without_jumps(record: Record, name: str) -> tuple[Channel, list[Fault]]:
+    """Take out steps of the clock: those back for good, and one that makes a channel longer than others.
 
-
-def _expected_span(record: Record, name: str) -> float:
-    """Return how long a channel should last, s: as the command; the command as the others."""
-    if name != "command" and "command" in record and len(record["command"]) > 1:
-        return float(np.ptp(record["command"].t))
-    spans = {(len(c), float(np.ptp(c.t))) for n, c in record.channels.items() if n != name and len(c) > 1}
-    return float(np.median([span for _, span in spans])) if spans else 0.0
-
-
-def _pauses(record: Record, name: str) -> FloatArray:
-    """Return begin and end (s) of the pauses of the channel that a span is expected from, shape (2, n)."""
-    others = [n for n in record.channels if n != name]
-    beside = next((n for n in others if n == "command"), next(iter(others), name))
-    t = record[beside].t
-    if len(t) < 3:
-        return np.empty((2, 0))
-    long = np.diff(t) > _SHORTEST_JUMP * stamp_order.median_period(t)
-    return np.array([t[:-1][long], t[1:][long]])
-
-
-def _without_jumps(
-    channel: Channel, name: str, expected: float, beside: FloatArray
-) -> tuple[Channel, list[Fault]]:
-    """Take out steps of the clock: those back for good, and one that makes the channel longer than others.
-
-    beside: pauses of another channel, s, (2, n): one at the same time is a gap of both.
+    A channel should last as the command does, the command as the others.
     """
+    channel, others = record[name], [n for n in record.channels if n != name]
     if len(channel) < 3:
         return channel, []
     at = stamp_order.jumps_back(channel.t)
-    step = np.diff(channel.t)
-    period = stamp_order.median_period(channel.t)
-    surplus = float(channel.t[-1] - channel.t[0]) - expected if expected else 0.0
-    largest = int(np.argmax(step))
+    step, period = np.diff(channel.t), stamp_order.median_period(channel.t)
+    known = ["command"] if "command" in others and len(record["command"]) > 1 else others
+    spans = {(len(record[n]), float(np.ptp(record[n].t))) for n in known if len(record[n]) > 1}
+    expected = float(np.median([span for _, span in spans])) if spans else 0.0
+    surplus, largest = float(channel.t[-1] - channel.t[0]) - expected, int(np.argmax(step))
+    beside = record["command" if "command" in others else (others or [name])[0]].t
     if (
         expected
         and step[largest] > _SHORTEST_JUMP * period
@@ -315,17 +318,17 @@ def _without_jumps(
     return _shorten_steps(channel, name, at) if at.any() else (channel, [])
 
 
-def _is_shared(step: FloatArray, beside: FloatArray) -> bool:
-    """Return whether another channel has no sample either in the middle half of a step (begin and end, s)."""
+def _is_shared(step: FloatArray, t: FloatArray) -> bool:
+    """Return whether a channel with stamps t pauses in the middle half of a step (begin and end, s), too."""
     begin, end = np.interp((0.25, 0.75), (0.0, 1.0), step)
-    return bool(np.any((beside[0] <= begin) & (beside[1] >= end)))
+    long = np.diff(t) > _SHORTEST_JUMP * stamp_order.median_period(t)
+    return len(t) > 2 and bool(np.any(long & (t[:-1] <= begin) & (t[1:] >= end)))
 
 
-def _shorten_steps(channel: Channel, name: str, at: BoolArray) -> tuple[Channel, list[Fault]]:
-    """Return the channel with each step of `at` as long as a period, and the fault."""
-    step = np.diff(channel.t)
-    shift = np.concatenate([[0.0], np.cumsum(np.where(at, step - stamp_order.median_period(channel.t), 0.0))])
+def _shorten_steps(c: Channel, name: str, at: BoolArray, left: float = 0.0) -> tuple[Channel, list[Fault]]:
+    """Return a channel with each step of `at` as long as a period, or as `left` (s), and the fault."""
+    step, left = np.diff(c.t), max(left, stamp_order.median_period(c.t))
+    shift = np.concatenate([[0.0], np.cumsum(np.where(at, step - left, 0.0))])
     first, largest = int(np.argmax(at)), float(np.abs(shift).max())
-    detail = f"{largest:.4g} s at {channel.t[first]:.3f} s"
-    share = 1.0 - (first + 1) / len(channel.t)
-    return Channel(channel.t - shift, channel.y), [Fault("clock_jump", name, share, detail, largest, "s")]
+    share, detail = 1.0 - (first + 1) / len(c.t), f"{largest:.4g} s at {c.t[first]:.3f} s"
+    return Channel(c.t - shift, c.y), [Fault("clock_jump", name, share, detail, largest, "s")]

@@ -52,7 +52,8 @@ def found_faults(faults: Iterable[Fault]) -> str:
     texts: dict[bool, list[str]] = {False: [], True: []}
     for kind, channels in kinds.items():
         names = list_names([*channels])
-        text = f"{names} missing" if kind == "missing_topic" else f"{words.fault(kind)} in {names}"
+        where = f"{words.fault(kind)} in {names}".removesuffix(" in ")
+        text = f"{names} missing" if kind == "missing_topic" else where
         texts[kind in MASKED].append(text)
     openings = (" The data have faults", " Samples were masked")
     return "".join(f"{o}: {'; '.join(t)}." for o, t in zip(openings, texts.values(), strict=True) if t)

@@ -8,12 +8,12 @@ import pytest
 import yaml
 from hypothesis import given, settings
 from random_rigs import RIG_NAMES, rigs
+from rig_tables import tables
 
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.errors import RigError
 from rsea_ros.model import rig_file
 from rsea_ros.model.rig import FIELDS, EffectSetting, PositionLoop, Quantity, Rig, unit_of
-from rsea_ros.model.rig_document import tables
 
 
 def test_every_shipped_rig_is_tested():

@@ -81,4 +81,5 @@ def test_only_what_is_masked_is_called_masked():
     assert found_faults(DISORDER) == f" The data have faults: out of order in {names}."
     missing = [Fault("missing_topic", name, 1.0) for name in ("velocity", "position", "velocity")]
     assert found_faults(missing) == " The data have faults: velocity and position missing."
+    assert found_faults([Fault("pause", "", 0.0)]) == " The data have faults: pause."
     assert found_faults([*DISORDER, NAN]).endswith(" Samples were masked: NaN in F/T torque.")
