@@ -139,6 +139,8 @@ class OneWorker(LoadFileScheduling):
 
     def _reschedule(self, node: WorkerController) -> None:
         """Give a worker another file before it is through, or let it end where none is left for it."""
+        if self._pending_of(self.assigned_work[node]) > 2:  # tests, as the base counts: asked after each
+            return
         if self._next_of(node) is not None:
             super()._reschedule(node)
         elif not node.shutting_down:
