@@ -72,6 +72,14 @@ WAITING = (
 )  # fmt: skip
 """Files that clocks of nodes and wires judge: the first worker alone takes them, one after the other."""
 
+NODELESS = tuple(
+    f"nodes/test_{name}.py" for name in (
+        "controller_link", "controller_steps", "devices", "drive", "experiment_parts", "identify_parts",
+        "orders", "player",
+    )
+)  # fmt: skip
+"""Files of nodes/ that start none, and whose clocks are their own: any worker takes them."""
+
 PATIENT = (
     "cli/test_run_launch_topics", "nodes/test_identify_diagnosis", "nodes/test_parameters",
     "nodes/test_policies", "nodes/test_processes", "extras/watch/test_page", "extras/watch/test_server",
@@ -101,7 +109,7 @@ def _place(nodeid: str) -> int:
     fits = lambda name: nodeid.startswith(f"test/{name}")  # noqa: E731
     places = (k for k, name in enumerate(WAITING + COMPUTING) if fits(name))
     last = len(WAITING + COMPUTING)
-    return last + 1 if any(map(fits, PATIENT)) else next(places, last)
+    return last + 1 if any(map(fits, PATIENT)) else last if any(map(fits, NODELESS)) else next(places, last)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -139,6 +147,8 @@ class OneWorker(LoadFileScheduling):
 
     def _reschedule(self, node: WorkerController) -> None:
         """Give a worker another file before it is through, or let it end where none is left for it."""
+        if self._pending_of(self.assigned_work[node]) > 2:  # tests, as the base counts: asked after each
+            return
         if self._next_of(node) is not None:
             super()._reschedule(node)
         elif not node.shutting_down:

@@ -25,11 +25,18 @@ USED = ("run", "ros", "can", "fleet", "export", "dev")
 PACKAGE = 'import sys\nprint("ran", *sys.argv[1:])\n'
 DECOY = PACKAGE if sys.version_info < (3, 11) else 'print("from the working directory")\n'
 FOREIGN = ("ROS_", "AMENT_", "PYTHON", "_ROS", "PIP_")
-LINK_PIP = f"""
+PIP = """
+import os, runpy, sys
+if any(os.path.getsize(file) for option, file in zip(sys.argv, sys.argv[1:]) if option == "-r"):
+    sys.path.insert(0, {real!r})
+    del sys.modules["pip"]
+    runpy.run_module("pip", run_name="__main__", alter_sys=True)
+"""
+LINK_PIP = """
 import glob, os, venv
 def link_pip(self, context):
     (place,) = glob.glob(os.path.join(glob.escape(context.env_dir), "lib", "python3*", "site-packages"))
-    os.symlink({str(Path(pip.__file__).parent)!r}, os.path.join(place, "pip"))
+    os.symlink({lazy!r}, os.path.join(place, "pip"))
 venv.EnvBuilder._setup_pip = link_pip
 """
 
@@ -54,11 +61,19 @@ def clone(tmp_path: Path) -> Path:
 
 @pytest.fixture(scope="module")
 def quick(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return where a Python lies whose environments get a link to a pip, which takes seconds to unpack."""
+    """Return where a Python lies whose environments get a link to a pip, which takes seconds to unpack.
+
+    Where all locks are empty that pip has nothing to do, and does not import the real one to find that out.
+    """
     place = tmp_path_factory.mktemp("python")
     venv.create(place, symlinks=True)
+    for folder in ("real", "lazy"):
+        (place / folder).mkdir()
+    (place / "real" / "pip").symlink_to(Path(pip.__file__).parent)
+    (place / "lazy" / "__init__.py").touch()
+    (place / "lazy" / "__main__.py").write_text(PIP.format(real=str(place / "real")))
     (packages,) = place.glob("lib/python3*/site-packages")
-    (packages / "link_pip.py").write_text(LINK_PIP)
+    (packages / "link_pip.py").write_text(LINK_PIP.format(lazy=str(place / "lazy")))
     (packages / "link_pip.pth").write_text("import link_pip\n")
     return place / "bin"
 

@@ -2,10 +2,11 @@
 
 from pathlib import Path
 
-from test.conftest import COMPUTING, PATIENT, WAITING
+from test.conftest import COMPUTING, NODELESS, PATIENT, WAITING
 
 HERE = Path(__file__).parent
 
 
 def test_what_takes_longest_is_there():
-    assert [name for name in WAITING + COMPUTING + PATIENT if not list(HERE.glob(f"{name}*"))] == []
+    named = WAITING + COMPUTING + PATIENT + NODELESS
+    assert [name for name in named if not list(HERE.glob(f"{name}*"))] == []

@@ -77,9 +77,10 @@ def least(several: list[Margins]) -> Margins:
 
 def encirclements(around: ComplexArray) -> FloatArray:
     """Return how often each row of 1 + L, shape (…, n), turns about zero, less the turn between its ends."""
-    turned = np.unwrap(np.angle(around), axis=-1)
-    straight = np.angle(around[..., -1]) - np.angle(around[..., 0])
-    return np.abs(np.round((turned[..., -1] - turned[..., 0] - straight) / (2.0 * np.pi)))
+    step = np.diff(np.angle(around), axis=-1)
+    forth, back = (np.count_nonzero(beyond, axis=-1) for beyond in (step > np.pi, step < -np.pi))
+    turns: FloatArray = np.abs(forth - back + 0.0 * step.sum(axis=-1))  # NaN where a response is none
+    return turns
 
 
 def _crossings(sign: FloatArray, loop: ComplexArray, hz: FloatArray) -> tuple[ComplexArray, FloatArray]:

@@ -34,7 +34,7 @@ class GearPath(NamedTuple):
     h: float
 
 
-@njit(inline="always")
+@njit(cache=True, inline="always")
 def swing(y, v, t, chassis):  # type: ignore[no-untyped-def]
     """Return y and v after a time t of free motion: exact, under- and overdamped."""
     k, b, j = chassis
@@ -50,7 +50,7 @@ def swing(y, v, t, chassis):  # type: ignore[no-untyped-def]
     return y * (c + decay * n) + v * n, v * (c - decay * n) - y * (k / j) * n
 
 
-@njit(inline="always")
+@njit(cache=True, inline="always")
 def along(path, t):  # type: ignore[no-untyped-def]
     """Return angle, speed and integral of the angle of the gear at a time t of the step."""
     d_0, w_0, d_1, w_1, h = path
@@ -61,7 +61,7 @@ def along(path, t):  # type: ignore[no-untyped-def]
     return angle, speed, t * (d_0 + t * (w_0 / 2.0 + t * (square / 3.0 + t * cube / 4.0)))
 
 
-@njit(inline="always")
+@njit(cache=True, inline="always")
 def release(side, half, path, chassis):  # type: ignore[no-untyped-def]
     """Return when in the step the flank stops pushing: 0 without contact, h when it pushes throughout."""
     if side == 0.0:
@@ -76,7 +76,7 @@ def release(side, half, path, chassis):  # type: ignore[no-untyped-def]
     return h * c_0 / (c_0 - c_1) if c_0 > 0.0 else 0.0
 
 
-@njit(inline="always")
+@njit(cache=True, inline="always")
 def impact(side, half, y, v, start, path, chassis):  # type: ignore[no-untyped-def]
     """Return when a chassis free since `start` meets the flank that it is behind at h, by regula falsi."""
     low, high = start, path.h
@@ -100,7 +100,7 @@ def impact(side, half, y, v, start, path, chassis):  # type: ignore[no-untyped-d
     return t
 
 
-@njit(inline="always")
+@njit(cache=True, inline="always")
 def over_step(y_0, v_0, side, half, path, chassis):  # type: ignore[no-untyped-def]
     """Return y, v, the flank (-1, 0, 1) at the end of a step, and the integral of y over it."""
     d_1, w_1, h = path.d_1, path.w_1, path.h
@@ -124,7 +124,7 @@ def over_step(y_0, v_0, side, half, path, chassis):  # type: ignore[no-untyped-d
     return d_1 - side * half, w_1, side, area + whole - before - side * half * (h - meets)
 
 
-@njit(inline="always")
+@njit(cache=True, inline="always")
 def seat_torque(half, path, chassis):  # type: ignore[no-untyped-def]
     """Return the torque of a spring with a seat, N m: the mean over the step, and at its end."""
     d_0, _, d_1, _, h = path

@@ -9,7 +9,7 @@ from rsea_ros.compiler import njit
 from rsea_ros.effects.signal_table import AFTER, BEFORE, COMMAND, CURRENT, CURRENT_BEFORE
 
 
-@njit(inline="always")
+@njit(cache=True, inline="always")
 def put_beside(s, before, after):  # type: ignore[no-untyped-def]
     """Note the commands (N m) of the steps before and after, where this one's mean lies between them."""
     s[BEFORE], s[AFTER] = before - s[COMMAND], after - s[COMMAND]
@@ -18,19 +18,19 @@ def put_beside(s, before, after):  # type: ignore[no-untyped-def]
     s[CURRENT_BEFORE], s[CURRENT] = both_held(s)
 
 
-@njit(inline="always")
+@njit(cache=True, inline="always")
 def both_held(s):  # type: ignore[no-untyped-def]
     """Return the commands (N m) that the step begins and ends with."""
     return s[COMMAND] + s[BEFORE], s[COMMAND] + s[AFTER]
 
 
-@njit(inline="always")
+@njit(cache=True, inline="always")
 def until_change(s):  # type: ignore[no-untyped-def]
     """Return the share of the step in which the first of both commands is held; 1 where there is one."""
     return s[AFTER] / (s[AFTER] - s[BEFORE]) if s[AFTER] != s[BEFORE] else 1.0
 
 
-@njit(inline="always")
+@njit(cache=True, inline="always")
 def put_both(s, before, after):  # type: ignore[no-untyped-def]
     """Put what a law makes of both commands (N m) in their place, and its mean over the step."""
     share = until_change(s)
@@ -38,7 +38,7 @@ def put_both(s, before, after):  # type: ignore[no-untyped-def]
     s[BEFORE], s[AFTER] = before - s[COMMAND], after - s[COMMAND]
 
 
-@njit(inline="always")
+@njit(cache=True, inline="always")
 def put_lagged(s, changed, end, moved, moved_first):  # type: ignore[no-untyped-def]
     """Put a lagged current in the command's place: at the change and at the end of the step, N m.
 
@@ -52,7 +52,7 @@ def put_lagged(s, changed, end, moved, moved_first):  # type: ignore[no-untyped-
     s[CURRENT], s[CURRENT_BEFORE] = end, changed
 
 
-@njit(inline="always")
+@njit(cache=True, inline="always")
 def scale(s, gain):  # type: ignore[no-untyped-def]
     """Multiply the command by a gain."""
     s[COMMAND] *= gain

@@ -12,7 +12,7 @@ from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
 from rsea_ros.effects.signal_table import GEAR_TORQUE, GEAR_VELOCITY, Port
 
 
-@njit(inline="always")
+@njit(cache=True, inline="always")
 def level(p, w):  # type: ignore[no-untyped-def]
     """Return the friction torque at a speed, N m."""
     return p[0]

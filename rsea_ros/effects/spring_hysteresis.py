@@ -23,7 +23,7 @@ _LARGEST = 20.0
 """Of z: what hardens further is no hysteresis."""
 
 
-@njit(inline="always")
+@njit(cache=True, inline="always")
 def reach(a, u):  # type: ignore[no-untyped-def]
     """Return (1 - exp(-a u)) / a, the gain of z from 0 over a path u, and its integral over the path."""
     x = a * u
@@ -34,7 +34,7 @@ def reach(a, u):  # type: ignore[no-untyped-def]
     return gain, (u - gain) / a
 
 
-@njit(inline="always")
+@njit(cache=True, inline="always")
 def along(z, u, gamma):  # type: ignore[no-untyped-def]
     """Return z at the end of a forward way of u angles, and its integral over the way."""
     area, beyond = 0.0, min(gamma + 0.5, 0.0)
@@ -53,7 +53,7 @@ def along(z, u, gamma):  # type: ignore[no-untyped-def]
     return min(max(z + rest * gain, -_LARGEST), _LARGEST), area + z * u + rest * rise
 
 
-@njit(inline="always")
+@njit(cache=True, inline="always")
 def way_of(s, x):  # type: ignore[no-untyped-def]
     """Return how far the deflection has gone in the step; from where it was found at first, no way."""
     if s[COMMIT] != 1.0:

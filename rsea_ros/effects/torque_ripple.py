@@ -18,7 +18,7 @@ from rsea_ros.effects.signal_table import GEAR_TORQUE, ROTOR_ANGLE, Port
 LAST, STARTED = range(2)
 
 
-@njit(inline="always")
+@njit(cache=True, inline="always")
 def mean_ripple(p, middle, way):  # type: ignore[no-untyped-def]
     """Return the mean torque over a travel of the rotor around an angle: the ripple times a sinc, N m."""
     half = 0.5 * p[1] * way

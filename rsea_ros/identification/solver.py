@@ -12,10 +12,11 @@ from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from scipy.linalg.blas import dger
-from threadpoolctl import threadpool_limits
+from threadpoolctl import ThreadpoolController
 
 from rsea_ros.identification.problem import Problem, simulate_cases
 from rsea_ros.identification.unknowns import SMOOTH, Unknown, apply, bounds_of, start_vector
@@ -81,7 +82,6 @@ def jacobian_columns(
 
     Zero where a step of the unknown makes the simulation run away.
     """
-
     clocks = {i: problem.unknowns[i] for i in which if problem.unknowns[i].is_clock}
     others = [i for i in which if i not in clocks]
 
@@ -298,10 +298,11 @@ def bounded_step(problem: Problem, theta: FloatArray, normal: FloatArray, slope:
 @contextmanager
 def one_blas_thread() -> Iterator[None]:
     """Keep BLAS from starting threads inside a with statement; else a fit takes four times as long."""
-    with threadpool_limits(1, user_api="blas"):
+    with _libraries().limit(limits=1, user_api="blas"):
         yield
 
 
+_libraries = cache(ThreadpoolController)
 _CORES: ContextVar[int] = ContextVar("cores", default=2)
 
 

@@ -87,7 +87,7 @@ def angle_at(record: Record, ends: FloatArray) -> FloatArray:
     if "velocity" in record and len(t) > 1:
         at, v = _finite(record, "velocity")
         if np.array_equal(at, t):
-            return _cubics(t, q, v, np.clip(ends, t[0], t[-1]))
+            return np.asarray(_cubics(t, q, v, np.clip(ends, t[0], t[-1])))
     return np.interp(ends, t, q)
 
 
@@ -101,13 +101,18 @@ def _finite(record: Record, name: str) -> tuple[FloatArray, FloatArray]:
     return np.arange(2.0), np.zeros(2)
 
 
-def _cubics(t: FloatArray, y: FloatArray, slope: FloatArray, at: FloatArray) -> FloatArray:
-    """Return at some times within t the cubics through y that have its slope there (Hermite)."""
-    k = np.clip(np.searchsorted(t, at, side="right") - 1, 0, len(t) - 2)
-    width = t[k + 1] - t[k]
-    u = (at - t[k]) / width
-    left, right = u * (1.0 - u) ** 2 * width * slope[k], u**2 * (u - 1.0) * width * slope[k + 1]
-    return np.asarray(y[k] + (y[k + 1] - y[k]) * u**2 * (3.0 - 2.0 * u) + left + right)
+@njit(cache=True, nogil=True, error_model="numpy")
+def _cubics(t, y, slope, at):  # type: ignore[no-untyped-def]
+    """Return at some rising times within t the cubics through y that have its slope there (Hermite)."""
+    values, k = np.empty(len(at)), 0
+    for i in range(len(at)):
+        while k < len(t) - 2 and t[k + 1] <= at[i]:
+            k += 1
+        width = t[k + 1] - t[k]
+        u = (at[i] - t[k]) / width
+        left, right = u * (1.0 - u) ** 2 * width * slope[k], u**2 * (u - 1.0) * width * slope[k + 1]
+        values[i] = y[k] + (y[k + 1] - y[k]) * u**2 * (3.0 - 2.0 * u) + left + right
+    return values
 
 
 def _has_moved(y: FloatArray) -> bool:

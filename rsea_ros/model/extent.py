@@ -22,8 +22,8 @@ def check_extent(record: Record, start: float, stop: float) -> None:
 
     A clock that was set during the recording, or a pause of hours, would need millions of empty steps.
     """
-    stamps = [c.t for c in record.channels.values()]
-    covered = max(len(t) * float(np.median(np.diff(t))) if len(t) > 1 else 0.0 for t in stamps)
+    stamps = (c.t for c in record.channels.values() if stop - start > LONGEST_PAUSE)  # else it is not needed
+    covered = max((len(t) * float(np.median(np.diff(t))) for t in stamps if len(t) > 1), default=0.0)
     if stop - start <= LONGEST_PAUSE + (1.0 + MOST_EMPTY) * covered:
         return
     pauses = [(n, int(np.argmax(np.diff(c.t))), c.t) for n, c in record.channels.items() if len(c) > 1]
@@ -85,7 +85,7 @@ def check_pace(record: Record) -> None:
 
 def check_slow(record: Record) -> None:
     """Raise IdentificationError for a record that lasts far too long for its rates."""
-    if is_slow(record) and _span(record) > LONGEST_SLOW:
+    if _span(record) > LONGEST_SLOW and is_slow(record):
         lasts, rate = f"{record.source}: lasts {_span(record):.4g} s", f"{max(_rates(record)):.3g} Hz"
         raise IdentificationError(
             f"{lasts}, expected up to {LONGEST_SLOW:g} s at {rate}: {AS_SECONDS} If so, cut the record"

@@ -7,6 +7,7 @@ import os
 import sysconfig
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -21,12 +22,7 @@ from rsea_ros.records.record import UNITS
 
 def rig_to_document(rig: Rig) -> dict[str, Any]:
     """Return the rig as the mapping that its YAML file holds."""
-    document: dict[str, Any] = {
-        "name": rig.name,
-        "about": rig.about,
-        "source": rig.source,
-        "proximal": rig.proximal,
-    }
+    document: dict[str, Any] = {n: getattr(rig, n) for n in ("name", "about", "source", "proximal")}
     usual = {
         "linear": False, "ft_end": "spring_end", "encoder_end": "gear_output", "beside_spring": "chassis",
         "motion": "simulated",
@@ -49,11 +45,7 @@ def rig_to_document(rig: Rig) -> dict[str, Any]:
     document["known"] = sorted(rig.known)
     document["sensors"] = {n: _sensor_to_document(n, s) for n, s in rig.sensors.items()}
     if rig.controller:
-        document["controller"] = {
-            "k_p": rig.controller.k_p,
-            "k_v": rig.controller.k_v,
-            "limit": rig.controller.limit,
-        }
+        document["controller"] = {key: getattr(rig.controller, key) for key in ("k_p", "k_v", "limit")}
     document["effects"] = [
         {
             "name": e.name,
@@ -128,15 +120,13 @@ def packaged_names(kind: str = "rigs") -> list[str]:
     return sorted({p.stem for folder in rig_folders() for p in (folder.parent / kind).glob("*.yaml")})
 
 
-def rig_folders() -> list[Path]:
+@cache
+def rig_folders() -> tuple[Path, ...]:
     """Return where rigs lie: beside the source, or in the share of the installed package."""
-    source = Path(__file__).resolve()
-    candidates = [
-        source.parents[2] / "config" / "rigs",
-        Path(sysconfig.get_path("data")) / "share/rsea_ros/config/rigs",
-    ]
-    candidates += [parent / "share/rsea_ros/config/rigs" for parent in source.parents[3:7]]
-    return [folder for folder in candidates if folder.is_dir()]
+    parents = Path(__file__).resolve().parents
+    shares = (Path(sysconfig.get_path("data")), *parents[3:7])
+    candidates = [parents[2] / "config" / "rigs", *(s / "share/rsea_ros/config/rigs" for s in shares)]
+    return tuple(folder for folder in candidates if folder.is_dir())
 
 
 def load_rig(name_or_path: str | Path | Rig) -> Rig:

@@ -130,6 +130,14 @@ def test_gains_that_are_unstable_are_refused_with_their_bench(case):
     assert grid(RATE)[-1] < 0.5 * RATE
 
 
+def test_a_rate_at_which_no_gains_are_found_is_refused(monkeypatch):
+    """Looked for in a few places only: a whole search finds none at 50 Hz either."""
+    monkeypatch.setattr(synthesis, "EVALUATIONS", 12)
+    told = r"no gains keep the whole set .* at 50 Hz: largest sensitivity [\d.]+, expected 3 \(K_s ± 10 %"
+    with pytest.raises(ParameterError, match=told):
+        design(RIG, LOADS, 50.0)
+
+
 def test_a_controller_of_another_rate_or_none_is_refused():
     controller = TorqueController(RIG, RATE, GAINS)
     with pytest.raises(ParameterError, match=r"rate = 500.0 Hz, expected that of the controller, 280.0 Hz"):

@@ -187,6 +187,6 @@ def test_a_lag_beside_the_clocks_is_no_delay():
     """In a logarithm a lag has a plateau at nothing: from the clock's bound the fit went there and stayed."""
     late = RIG.with_effect("ft_sensor_lag", time_constant=1.5e-3)
     record = excited(late, "chirp", sensors=3, duration=8.0, amplitude=40.0, noise=20.0)
-    (cause,) = diagnose([record], RIG, settings=trying("ft_sensor_lag", "ft_delay", "base_compliance")).causes
+    (cause,) = diagnose([record], RIG, settings=trying("ft_sensor_lag", "ft_delay")).causes
     low, high = cause.parameters["time_constant"].ci95
     assert cause.name == "ft_sensor_lag" and low < 1.5e-3 < high

@@ -9,12 +9,10 @@ import pytest
 from independent.puzzle import noisy_resonance
 from scripted_scores import BLOCKS, model, score
 
-from rsea_ros.checks.faults import check
 from rsea_ros.diagnosis import score as scores
 from rsea_ros.diagnosis.data_split import TEST, TRAIN, VALIDATION
-from rsea_ros.diagnosis.diagnose import nominal_problem
 from rsea_ros.diagnosis.settings import BlockSettings
-from rsea_ros.identification.problem import Case
+from rsea_ros.identification.problem import Case, case_from
 from rsea_ros.model.drive import Drive
 from rsea_ros.model.rig_file import load_rig
 
@@ -254,6 +252,5 @@ def test_a_channel_is_lost_above_the_frequency_from_which_it_is_noise(edge, rate
 @pytest.mark.parametrize(("seed", "seconds"), [(3, 30.0), (3, 50.0), (6, 100.0), (8, 50.0)])
 def test_a_low_line_that_chance_has_lost_is_no_edge(seed, seconds):
     """With a few lines of two hundred below the edge, nearly all above such a line are lost, too."""
-    nominal = load_rig("paper_moving_output")
-    (case,) = nominal_problem([check(noisy_resonance(seed, seconds), nominal)], nominal).cases
+    case = case_from(noisy_resonance(seed, seconds), load_rig("paper_moving_output"))
     assert scores.lost_above(case, "ft") == pytest.approx(19.0, abs=1.0)

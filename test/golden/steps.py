@@ -84,7 +84,7 @@ VERBS: dict[str, tuple[str, ...]] = {
         f"simulate {RIG} --out bag",
         f"experiment {RIG} --limits torque=-1 --bag bag",
         f"experiment {RIG} --limits torqe=40", "design --torque -5", "design --unit rd85",
-        "control bare_drive", "control pd_joint --rate 280",
+        "control bare_drive",
         f"control {RIG} --rate 3", f"control {RIG} --rate 10000", f"control --free {RIG}",
         "export --fmu nowhere",
         "effects backlsh", "rig check map.yaml", "rig new a/b", "import map.yaml --map map.yaml --out x",

@@ -55,6 +55,7 @@ def session(bench, start, listener, tmp_path):
 
     def begin(driven=(), **values):
         end()
+        listener.hang_up()
         commands = listener.hear(JointState, "/rsea/torque_command", COMMAND)
         health = listener.hear(DiagnosticArray, "/diagnostics", COMMAND)
         kind, out = "driver" if driven else "plant", tmp_path / f"out{len(plants)}"

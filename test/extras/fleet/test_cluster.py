@@ -8,9 +8,16 @@ from types import SimpleNamespace
 
 import pytest
 
-from rsea_extras.fleet import FleetError, cluster
-from rsea_extras.fleet.cluster import OnDask, on_scheduler
+from rsea_extras.fleet import FleetError
 from rsea_extras.fleet.pool import Job, WorkerLost
+
+
+@pytest.fixture(scope="module")
+def cluster():
+    """The module on Dask: a quarter of a second in each worker, were it imported above."""
+    from rsea_extras.fleet import cluster
+
+    return cluster
 
 
 class Future:
@@ -46,21 +53,19 @@ class Client:
 
 
 @pytest.mark.parametrize(("is_killed", "error"), [(True, WorkerLost), (False, ValueError)])
-def test_an_error_comes_back_with_its_job(is_killed, error):
-    from distributed.scheduler import KilledWorker  # imported here: half a second in each worker
-
+def test_an_error_comes_back_with_its_job(cluster, is_killed, error):
     client, job = Client(), Job(print, 1)
-    killed = KilledWorker("task", SimpleNamespace(address="tcp://x"), 0)
+    killed = cluster.KilledWorker("task", SimpleNamespace(address="tcp://x"), 0)
     client.outcome = "error", killed if is_killed else ValueError("no")
-    workers = OnDask(client)
+    workers = cluster.OnDask(client)
     workers.submit(job)
     done = workers.next(1.0)
     assert done is not None and done.job == job and isinstance(done.error, error)
 
 
-def test_a_lost_scheduler_ends_the_run():
+def test_a_lost_scheduler_ends_the_run(cluster):
     client = Client()
-    workers = OnDask(client)
+    workers = cluster.OnDask(client)
     assert workers.next(0.0) is None
     client.outcome = "cancelled", None
     workers.submit(Job(print, 1))
@@ -71,7 +76,7 @@ def test_a_lost_scheduler_ends_the_run():
         workers.next(0.0)
 
 
-def test_a_lost_scheduler_leaves_no_traceback_of_dask_on_the_terminal(monkeypatch):
+def test_a_lost_scheduler_leaves_no_traceback_of_dask_on_the_terminal(cluster, monkeypatch):
     """Its client logs 40 lines while it tries to connect again; the run says it in one line."""
     written = io.StringIO()
     terminal = logging.StreamHandler(written)
@@ -82,13 +87,14 @@ def test_a_lost_scheduler_leaves_no_traceback_of_dask_on_the_terminal(monkeypatc
         raise OSError("refused")
 
     monkeypatch.setattr(cluster.distributed, "Client", refused)
-    with pytest.raises(FleetError, match="refused"), on_scheduler("tcp://127.0.0.1:1"):
+    with pytest.raises(FleetError, match="refused"), cluster.on_scheduler("tcp://127.0.0.1:1"):
         pass
     assert written.getvalue() == ""
 
 
 @pytest.mark.parametrize("address", ["foo", "tcp://foo", "tcp://foo:port", ""])
-def test_what_is_no_address_is_refused_at_once(address):
+def test_what_is_no_address_is_refused_at_once(cluster, address):
     """Dask waited a minute for its end, and then printed a traceback below the error."""
-    with pytest.raises(FleetError, match=r"no address, expected .*tcp://HOST:8786"), on_scheduler(address):
+    told = r"no address, expected .*tcp://HOST:8786"
+    with pytest.raises(FleetError, match=told), cluster.on_scheduler(address):
         pass
