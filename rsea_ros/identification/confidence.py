@@ -284,9 +284,13 @@ def is_off_rig(solution: Solution) -> bool:
 
 
 def off_rig(parameters: Iterable[ParameterEstimate]) -> tuple[Remark, ...]:
-    """Return a remark for each value that is surely not the rig's: far off, and determined by the data."""
+    """Return a remark for each value that is surely not the rig's: far off, and determined by the data.
+
+    Beside a misfit it has no interval, NaN.
+    """
     off = (p for p in parameters if abs(p.spreads_off) > FAR and p.told_by_data >= IDENTIFIABLE_SHARE)
+    told = ((p, (math.nan, math.nan) if p.beside_misfit else p.ci95) for p in off)
     return tuple(
-        Remark("off_rig", (p.name,), (p.start, p.value, *p.ci95, p.spreads_off), p.unit)
-        for p in off if not p.name.startswith(CLOCKS)
+        Remark("off_rig", (p.name,), (p.start, p.value, *ci95, p.spreads_off), p.unit)
+        for p, ci95 in told if not p.name.startswith(CLOCKS)
     )  # fmt: skip

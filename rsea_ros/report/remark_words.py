@@ -97,7 +97,7 @@ _WORDS: Mapping[Code, str] = {
     "coloured_noise": "The noise of the {channels} is coloured: its level was taken from the residual, "
     "which is steady, falls with frequency, and agrees with neither command nor motion nor another sensor.",
     "off_rig": "{name} differs from the rig: the rig states {stated} {unit}, the fit gives {fitted} {unit} "
-    "(95 %), {spreads} of the stated spreads away.",
+    "({doubt}), {spreads} of the stated spreads away.",
     "differs": "{name} differs as stated: {others}.",
     "other_records": "Nothing was fitted to {names}, of which the rig has conditions too.",
     "stretches": "Models were fitted and tested on {v[0]:.0f} s of the {v[1]:.0f} s recorded: on stretches "
@@ -137,8 +137,10 @@ def _sentence(r: Remark) -> str:
     if r.code == "play_undetermined":
         fields |= {"milli": 1e3 * v[0], "fall": -100.0 * v[1]}
     if r.code == "off_rig":
-        fields |= {"stated": words.number(v[0], 4), "fitted": "".join(words.with_doubt(*v[1:4])),
-                   "spreads": words.number(v[4], 2)}  # fmt: skip
+        sure = math.isfinite(v[2])
+        fields |= {"stated": words.number(v[0], 4), "spreads": words.number(v[4], 2)}
+        fields |= {"fitted": "".join(words.with_doubt(*v[1:4])) if sure else words.number(v[1], 4),
+                   "doubt": "95 %" if sure else "no interval"}  # fmt: skip
     return _WORDS[r.code].format(**fields)
 
 
