@@ -128,8 +128,17 @@ class SpringStart(NamedTuple):
     rate: float
 
 
-Restart = tuple[int, tuple[float, float] | SpringStart]
-"""Step of a drive before which it begins anew; position (rad) and velocity (rad/s) there, or the spring."""
+class LoadStart(NamedTuple):
+    """State at a start whose output moves: position (rad), velocity (rad/s), and what the spring shows."""
+
+    position: float
+    velocity: float
+    spring: SpringStart
+
+
+Restart = tuple[int, tuple[float, float] | SpringStart | LoadStart]
+"""Step of a drive before which it begins anew; position (rad) and velocity (rad/s) there, or the spring, or
+both."""
 
 
 def restarts(record: Record, start: float, step: float, *, from_rest: bool) -> tuple[Restart, ...]:

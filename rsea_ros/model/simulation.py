@@ -18,7 +18,15 @@ from rsea_ros.effects import signal_table as st
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.effects.effect import Effect
 from rsea_ros.errors import RigError
-from rsea_ros.model.drive import ON_GRID, Drive, SpringStart, drive_from, steps_per_sample, zero_unknown
+from rsea_ros.model.drive import (
+    ON_GRID,
+    Drive,
+    LoadStart,
+    SpringStart,
+    drive_from,
+    steps_per_sample,
+    zero_unknown,
+)
 from rsea_ros.model.equations import Mechanics, mechanics, train_ratio, with_structure
 from rsea_ros.model.extent import LARGEST, SMALLEST
 from rsea_ros.model.position_loop import STATES, control, loop_parameters, with_command
@@ -144,12 +152,16 @@ class Machine:
     start_maps: dict[str, FloatArray]
 
     def begin(
-        self, initial: tuple[float, float] | SpringStart = (0.0, 0.0), spring: SpringStart | None = None
+        self,
+        initial: tuple[float, float] | SpringStart | LoadStart = (0.0, 0.0),
+        spring: SpringStart | None = None,
     ) -> None:
         """Set the state to an output angle (rad) and velocity (rad/s), at time zero, with no history.
 
         spring: what its sensor shows at that time, where it is known; as `initial`, all that is known.
         """
+        if isinstance(initial, LoadStart):
+            spring, initial = initial.spring, (initial.position, initial.velocity)
         if isinstance(initial, SpringStart):
             rows = self.linear.outputs
             shown = start_map(self.mechanics, rows[OUTPUT_ROWS.index(initial.channel)])
