@@ -83,7 +83,8 @@ class ForwardStep:
         if chosen is not None and is_off_rig(chosen.solution):
             contenders += self._pairs_nearer_the_rig(chosen, close)
             chosen = self._choose(contenders)
-        trials = [self._far_behind(s) for s in _others(screened, finalists)]
+        near = {s.name for s in finalists}
+        trials = [self._far_behind(s) for s in screened if s.name not in near]
         trials += [self._refusal(m, chosen) for m in models if m is not chosen]
         return StepResult(chosen, trials)
 
@@ -187,11 +188,6 @@ def _look_alikes(effect: Effect, effects: Sequence[Effect]) -> set[str]:
     confusable, size = effect.claims.confusable_with, effect_size(effect.name)
     alike = look_alikes(effect.name, effects)
     return {e.name for e in alike if e.name in confusable or effect_size(e.name) <= size}
-
-
-def _others(screened: Sequence[ScreenedEffect], chosen: Sequence[ScreenedEffect]) -> list[ScreenedEffect]:
-    names = {s.name for s in chosen}
-    return [s for s in screened if s.name not in names]
 
 
 def select_stepwise(

@@ -13,7 +13,7 @@ the misfit is credible, and its estimates widen the intervals (model averaging, 
 most careful form: the span). Only the diagnosis decides which law it is.
 """
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import PurePath
 
@@ -157,7 +157,8 @@ def _better_start(problem: Problem, start: Rig | None, run: Map) -> FloatArray:
 def unknowns_of(rig: Rig, cases: Sequence[Case]) -> tuple[Unknown, ...]:
     """Return all that a fit of these cases may move."""
     channels = sorted({n for case in cases for n in case.measured})
-    stated = _stated_effects(rig, cases)
+    scale = scale_of(cases, rig) if rig.effects else Scale()
+    stated = [(effect_named(e.name).at(scale).widen(e.parameters), e.parameters) for e in rig.effects]
     effects = [unknowns_of_effect(e, start, rig.known | idle(e, rig)) for e, start in stated]
     own = [differs.values if (differs := rig.condition(case.source)) else {} for case in cases]
     records = {"", *(PurePath(case.source).name for case in cases)}
@@ -175,13 +176,6 @@ def _beside(rig: Rig, channels: Collection[str]) -> tuple[str, ...]:
     if rig.motion != "measured":
         return ()
     return ("spring_end.",) if "ft" in channels else ("spring_end.", "spring.")
-
-
-def _stated_effects(rig: Rig, cases: Sequence[Case]) -> Iterator[tuple[Effect, Mapping[str, float]]]:
-    """Yield the effects that a rig states with their parameters; bounds suit the machine and hold these."""
-    scale = scale_of(cases, rig) if rig.effects else Scale()
-    for e in rig.effects:
-        yield effect_named(e.name).at(scale).widen(e.parameters), e.parameters
 
 
 SCATTER = 0.005
