@@ -71,7 +71,8 @@ class ForwardStep:
     def run(self) -> StepResult:
         """Try every effect, and two at once where none helps alone."""
         screened = self.fits.screen(self.fits.on_pieces)
-        close = self._fit_to_pieces(screened)
+        best = screened[: self.settings.forward.piece_fits]  # also where no step helped: a guess may be poor
+        close = sorted(self.fits.fit_pieces(best), key=lambda s: s.cost)
         finalists = self._finalists(screened, close)
         models = self.fits.fit_all(finalists)
         if self.fits.is_far and all(
@@ -99,14 +100,6 @@ class ForwardStep:
     def _choose(self, models: Sequence[Candidate]) -> Candidate | None:
         """Return the model to accept."""
         return break_tie(models, self.current.validation, self.settings)
-
-    def _fit_to_pieces(self, screened: Sequence[ScreenedEffect]) -> list[ScreenedEffect]:
-        """Return the best of the screening fitted to the pieces, best first.
-
-        Also where no step helped: the guess may have been poor.
-        """
-        best = screened[: self.settings.forward.piece_fits]
-        return sorted(self.fits.fit_pieces(best), key=lambda s: s.cost)
 
     def _finalists(
         self, screened: Sequence[ScreenedEffect], close: Sequence[ScreenedEffect]

@@ -162,20 +162,16 @@ def unknowns_of(rig: Rig, cases: Sequence[Case]) -> tuple[Unknown, ...]:
     effects = [unknowns_of_effect(e, start, rig.known | idle(e, rig)) for e, start in stated]
     own = [differs.values if (differs := rig.condition(case.source)) else {} for case in cases]
     records = {"", *(PurePath(case.source).name for case in cases)}
-    tells = (u for u in unknowns_of_rig(rig) if not u.name.startswith(_beside(rig, channels)))
+    silent: tuple[str, ...] = ()
+    if rig.motion == "measured":
+        silent = ("spring_end.",) if "ft" in channels else ("spring_end.", "spring.")
+    tells = (u for u in unknowns_of_rig(rig) if not u.name.startswith(silent))
     of_rig = [u for u in tells if not own or any(u.name not in values for values in own)]
     return (
         *(u for u in of_rig if u.name.partition("@")[2] in records),
         *(u for group in effects for u in group),
         *(clocks(channels, rig) if not is_inverse(rig) else ()),
     )
-
-
-def _beside(rig: Rig, channels: Collection[str]) -> tuple[str, ...]:
-    """Return the parts of a rig that channels along a measured motion say nothing of."""
-    if rig.motion != "measured":
-        return ()
-    return ("spring_end.",) if "ft" in channels else ("spring_end.", "spring.")
 
 
 SCATTER = 0.005

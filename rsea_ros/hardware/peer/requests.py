@@ -64,13 +64,10 @@ class LineRequests:
             answer = self._do(now, line)
             if answer is None:
                 return False
-            self._tell(answer)
+            text = memoryview(json.dumps(answer).encode() + b"\n")
+            while text:
+                text = text[os.write(self._outlet, text) :]
         return bool(data)
-
-    def _tell(self, answer: dict[str, Any]) -> None:
-        text = memoryview(json.dumps(answer).encode() + b"\n")
-        while text:
-            text = text[os.write(self._outlet, text) :]
 
     def _do(self, now: int, line: bytes) -> dict[str, Any] | None:
         try:
