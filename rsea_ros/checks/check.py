@@ -54,7 +54,12 @@ def check_record(
     rig = rig.under(record.source)
     with one_blas_thread(), np.errstate(all="ignore"):
         if rig.loop is not None and "reference" not in record:
-            return Findings(record.source, rig.name, (_no_targets(record),), record.faults)
+            no_targets = Finding(
+                "red", "topics", "reference", expected="the target positions that drove the run",
+                detail=f"only {', '.join(record.channels)}",
+                remedy="record the targets, or name their topic with --topic desired_position=…",
+            )  # fmt: skip
+            return Findings(record.source, rig.name, (no_targets,), record.faults)
         have = "; ".join(filter(None, (", ".join(record.channels), unused_sentence(record, rig))))
         record = bound_values(record if rig.loop is None else with_command(record, rig))
         checked = check(record, rig)
@@ -79,14 +84,6 @@ def check_record(
     findings = tuple(_of_targets(f) for f in every) if rig.loop is not None else tuple(every)
     found = tuple(dict.fromkeys(findings))
     return Findings(record.source, rig.name, found, faults, pairs=checked.pairs, masked=checked.masked)
-
-
-def _no_targets(record: Record) -> Finding:
-    return Finding(
-        "red", "topics", "reference", expected="the target positions that drove the run",
-        detail=f"only {', '.join(record.channels)}",
-        remedy="record the targets, or name their topic with --topic desired_position=…",
-    )
 
 
 def _of_targets(f: Finding) -> Finding:

@@ -264,7 +264,8 @@ def _setting(
     start = float(record["command"].t[0])
     record = replace(record, channels={n: c for n, c in record.channels.items() if n != "motor_torque"})
     begin, end = _liveliest(record, masked)
-    record, masked = _cut(record, masked, begin, end)
+    inside = {n: (c.t >= begin) & (c.t < end) for n, c in record.channels.items() if n in masked}
+    record, masked = record.between(begin, end), {n: masked[n][keep] for n, keep in inside.items()}
     informative = channels_that_tell(record, rig)
     sensed = [n for n in SENSED if n in informative]  # a held motor torque shows no clock
     values = unknowns_of_rig(rig)
@@ -316,11 +317,3 @@ def _liveliest(record: Record, masked: Mapping[str, BoolArray]) -> tuple[float, 
     sensors = np.sum(counts > 0.5 * counts.max(axis=1, initial=1, keepdims=True), axis=0)
     begin = float(begins[np.lexsort((within, sensors))[-1]])
     return begin, begin + LONGEST
-
-
-def _cut(
-    record: Record, masked: Mapping[str, BoolArray], begin: float, end: float
-) -> tuple[Record, dict[str, BoolArray]]:
-    """Return record and masks between two instants (s), as they are where that is all of them."""
-    inside = {n: (c.t >= begin) & (c.t < end) for n, c in record.channels.items()}
-    return record.between(begin, end), {n: masked[n][keep] for n, keep in inside.items() if n in masked}

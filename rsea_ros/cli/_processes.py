@@ -81,7 +81,8 @@ class Processes:
                 deadline, logged = time.monotonic() + timeout, size
             if time.monotonic() > deadline:
                 raise self._failure(node, f"got no further for {timeout:g} s")
-            progress(self._share(node))
+            shares = re.findall(rb"\b(\d+)%", self.log(node).read_bytes())
+            progress(int(shares[-1]) / 100.0 if shares else 0.0)
             time.sleep(POLL)
         if self._running[node].returncode != 0:
             raise self._failure(node, "failed")
@@ -91,10 +92,6 @@ class Processes:
     def stop(self, *nodes: str) -> None:
         """Stop the nodes (SIGTERM), wait, and kill those that do not end."""
         stop([self._running.pop(node) for node in nodes])
-
-    def _share(self, node: str) -> float:
-        shares = re.findall(rb"\b(\d+)%", self.log(node).read_bytes())
-        return int(shares[-1]) / 100.0 if shares else 0.0
 
     def _failure(self, node: str, event: str) -> RseaError:
         """Return an error with the last line of a node."""

@@ -210,7 +210,8 @@ class TorqueController:
         for wanted in self._prediction.between(desired, missed) if missed else ():
             self._coast(wanted, desired_offset)
         ahead, model = self._ahead(desired, desired_offset), self._reference
-        largest, most = self._largest(), self._limits.slew * self._law.period
+        most, limit = self._limits.slew * self._law.period, self._limits.torque
+        largest = min(limit, max(abs(self._begin), limit * self._grown()))
         forward = min(max(model.torque(ahead), -largest), largest)
         more, lead, learned = model.more(forward)
         more = min(max(more, -largest - forward), largest - forward)
@@ -344,7 +345,3 @@ class TorqueController:
         left = 1.0 - np.array([self._grown(AHEAD + k) for k in range(len(ahead))])
         softened: FloatArray = ahead + self._jump * left * left * (3.0 - 2.0 * left)
         return softened
-
-    def _largest(self) -> float:
-        """Return the largest torque that the limits let through now, N m."""
-        return min(self._limits.torque, max(abs(self._begin), self._limits.torque * self._grown()))

@@ -120,9 +120,6 @@ class SpringEncoder:
     def _lose(self, trouble: str) -> None:
         self.losses += self.used
         self.used, self.trouble = False, trouble
-        self._forget()
-
-    def _forget(self) -> None:
         self._agreed = self._silent = self._peak = self._step = 0.0
         self._phi = self._off = self._last = math.nan
 

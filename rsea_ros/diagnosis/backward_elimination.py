@@ -114,7 +114,8 @@ class ReducedModels:
         rest, old = rests[name], effect_named(name).main
         solution = rest.solution
         same = {rival.main.name: model.solution.values[f"{name}.{old.name}"]}
-        guesses = [fitted_parameters(t, rival) for t in trials if is_trial_of(t, rival.name, rest)][-1:]
+        tried = [t for t in trials if t.name == rival.name and set(t.beside.causes) == set(rest.causes)]
+        guesses = [fitted_parameters(t, rival) for t in tried[-1:]]
         if not guesses:
             rig, _ = apply(rest.problem.rig, rest.problem.unknowns, solution.theta)
             guesses = initial_guesses(rival, view_for(rival, model.cases, rig, rest.outputs))
@@ -219,11 +220,6 @@ def nested_sequence(selection: Selection, models: ReducedModels) -> Selection:
         rests = models.without(largest).values()
         nested.append(max(rests, key=lambda m: likelier_by(m, largest, models.settings.floor.far)))
     return replace(selection, models=(selection.models[0], *_in_order(list(reversed(nested)))))
-
-
-def is_trial_of(trial: Trial, name: str, model: Candidate) -> bool:
-    """Return whether a trial is of an effect beside a model, or one with the same causes."""
-    return trial.name == name and set(trial.beside.causes) == set(model.causes)
 
 
 def fitted_parameters(trial: Trial, effect: Effect) -> Guess:

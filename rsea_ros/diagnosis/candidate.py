@@ -216,7 +216,8 @@ class FitSetup:
 
     def solve(self, problem: Problem, theta: FloatArray | None, matrix: FloatArray | None = None) -> Solution:
         """Fit the unknowns of a masked problem. matrix: derivatives to begin with."""
-        gain = self.gain * _distance(self.weights)
+        ratios = [] if self.weights is None else [self.weights.ratio(n) for n in self.weights.sums]
+        gain = self.gain * min(max([1.0, *ratios]), _FARTHEST)  # worst channel's RMS over the noise
         return solve(problem, theta, iterations=self.iterations, gain=gain, run=self.run, matrix=matrix)
 
 
@@ -324,12 +325,6 @@ def _main(solution: Solution, name: str) -> tuple[Unknown, float]:
     main = f"{name}.{effect_named(name).main.name}"
     unknowns = zip(solution.problem.unknowns, solution.theta, strict=True)
     return next((u, float(t)) for u, t in unknowns if u.name == main)
-
-
-def _distance(weights: Score | None) -> float:
-    """Return the RMS of a residual over the noise in its worst channel, at least 1."""
-    ratios = [] if weights is None else [weights.ratio(n) for n in weights.sums]
-    return min(max([1.0, *ratios]), _FARTHEST)
 
 
 def _reweight(solution: Solution, problem: Problem) -> FloatArray:

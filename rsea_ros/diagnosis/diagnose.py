@@ -74,15 +74,10 @@ def diagnose(
         tell("weighing the causes", 0.97)
         result = conclude(selection, stages, examined, pools, settings)
     cut = stretches_of(used, nominal, settings)
-    lost = _lost_cycles(result)
-    known = (*torque_scale(nominal), *stated_differences(nominal))
-    return replace(result, remarks=(*unseen, *lost, *remarks, *cut, *known, *result.remarks))
-
-
-def _lost_cycles(result: Diagnosis) -> tuple[Remark, ...]:
-    """Return the remark that cycles lost by the driver are a likely cause of the misfit, if they are."""
     lost = 0 if result.verdict == "nothing_wrong" else lost_behind(result.faults, result.before)
-    return (Remark("lost_cycles", values=(float(lost),)),) if lost else ()
+    likely = (Remark("lost_cycles", values=(float(lost),)),) if lost else ()
+    known = (*torque_scale(nominal), *stated_differences(nominal))
+    return replace(result, remarks=(*unseen, *likely, *remarks, *cut, *known, *result.remarks))
 
 
 def nominal_problem(

@@ -132,7 +132,8 @@ def torque_along(
     outputs: simulated channels of the case. None where nothing that was measured shows that angle.
     """
     if isinstance(case.drive, Motion):
-        return _along(case.drive, case, outputs)
+        keep = case.mask["motor_torque"]  # the torque missing there is what the motor did not need
+        return case.drive.q[keep], (outputs["motor_torque"] - case.measured["motor_torque"])[keep]
     channel, per_unit = _angle_shown(case, rig)
     if not channel:
         return None
@@ -155,12 +156,6 @@ def _angle_shown(case: Case, rig: Rig) -> tuple[str, float]:
         shown |= {"deflection": 1.0}
         shown |= {"ft": 1.0 / rig["spring.stiffness"]} if rig.ft_end == "spring_end" else {}
     return next(((n, per_unit) for n, per_unit in shown.items() if n in case.measured), ("", 0.0))
-
-
-def _along(motion: Motion, case: Case, outputs: Mapping[str, FloatArray]) -> tuple[FloatArray, FloatArray]:
-    """Return the angles of a measured motion (rad), and the torque that its motor did not need, N m."""
-    keep = case.mask["motor_torque"]
-    return motion.q[keep], (outputs["motor_torque"] - case.measured["motor_torque"])[keep]
 
 
 def peaks(level: FloatArray, apart: int) -> list[int]:

@@ -192,17 +192,12 @@ def separating_run(accepted: Solution, rivals: Sequence[Solution], rate: float) 
         run = allowed_run(rig, case, option.kind, _settings(option, rate), option.relative * present)
         if run is None:
             continue
-        separation = min(_separation(rival, run.case) for rival in rivals)
+        separation = min(_remainder(replace(r.problem, cases=(run.case,)), r.theta) for r in rivals)
         if separation > _SEPARATES:
             settings = _as_excited(run, rig) | {"separation_times_noise": round(separation, 3)}
             return replace(undecided, reason="separates", separation=separation, excitation=settings)
         most = max(most, separation)
     return replace(undecided, reason="inseparable", separation=most)
-
-
-def unit_of_commands(rig: Rig) -> str:
-    """Return the unit of a rig's commands: of torques, or of target positions."""
-    return UNITS["command" if rig.loop is None else "reference"]
 
 
 def _settings(option: ExcitationOption, rate: float) -> ExcitationSettings:
@@ -216,9 +211,9 @@ def _settings(option: ExcitationOption, rate: float) -> ExcitationSettings:
 
 def _as_excited(run: AllowedRun, rig: Rig) -> dict[str, float | str]:
     """Return a run as parameters of the node excite, with its peak and the unit."""
-    s = run.settings
+    s, unit = run.settings, UNITS["command" if rig.loop is None else "reference"]
     given: dict[str, float | str] = {
-        "kind": run.kind, "amplitude": s.amplitude, "unit": unit_of_commands(rig), "low": s.low,
+        "kind": run.kind, "amplitude": s.amplitude, "unit": unit, "low": s.low,
         "high": s.high, "duration": s.duration, "rate": s.rate, "seed": s.seed, "peak": round(run.peak, 3),
     }  # fmt: skip
     given |= {"noise": s.noise} if run.kind == "chirp" else {}
@@ -228,11 +223,6 @@ def _as_excited(run: AllowedRun, rig: Rig) -> dict[str, float | str]:
 def _model(solution: Solution) -> Rig:
     """Return the rig of a fit."""
     return apply(solution.problem.rig, solution.problem.unknowns, solution.theta)[0]
-
-
-def _separation(rival: Solution, case: Case) -> float:
-    """Return the residual of a rival fitted to the accepted model's motion, over the noise."""
-    return _remainder(replace(rival.problem, cases=(case,)), rival.theta)
 
 
 def _remainder(problem: Problem, theta: FloatArray) -> float:

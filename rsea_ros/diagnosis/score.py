@@ -60,7 +60,8 @@ def missed_response(case: Case, output: FloatArray, channel: str, blocks: IntArr
     if len(parts) < _ENOUGH:
         return 0.0
     r, y, u_hat = (_spectra(parts, v) for v in (case.measured[channel] - output, output, u))
-    coherence = _coherence(r, u_hat)
+    power = (np.abs(r) ** 2).sum(axis=0) * (np.abs(u_hat) ** 2).sum(axis=0)
+    coherence = np.abs(np.sum(r * u_hat.conj(), axis=0)) ** 2 / np.maximum(power, 1e-300)
     chance = 1.0 - (_FALSE_ALARM / r.shape[1]) ** (1.0 / (len(parts) - 1))
     limit = max(_CLEAR, chance)
     error, response = (np.abs(np.sum(v * u_hat.conj(), axis=0)) for v in (r, y))
@@ -103,11 +104,6 @@ def _spectra(parts: list[IntArray], values: FloatArray) -> ComplexArray:
     """Return the spectra of the segments without mean and highest line, shape (segments, frequencies)."""
     cut = np.array([values[p] - values[p].mean() for p in parts])
     return np.asarray(np.fft.rfft(cut * np.hanning(cut.shape[1]), axis=1)[:, 1:-1])
-
-
-def _coherence(a: ComplexArray, b: ComplexArray) -> FloatArray:
-    cross = np.abs(np.sum(a * b.conj(), axis=0)) ** 2
-    return np.asarray(cross / np.maximum((np.abs(a) ** 2).sum(axis=0) * (np.abs(b) ** 2).sum(axis=0), 1e-300))
 
 
 @dataclass(frozen=True)
@@ -174,8 +170,9 @@ def score(
     """Return the score of simulated outputs on the samples of `cases` (the problem's, otherwise masked)."""
     runs = list(zip(cases, outputs, strict=True))
     missed = [
-        missed_response(c, o["ft"], "ft", blocks_of(c, "ft", rule)) for c, o in runs if _has_ft(c, o)
-    ]
+        missed_response(c, o["ft"], "ft", blocks_of(c, "ft", rule))
+        for c, o in runs if "ft" in c.measured and "ft" in o
+    ]  # fmt: skip
     sums, counts, run = {}, {}, np.zeros(0, np.int64)
     for n in problem.channels:
         by_case = [_by_block(case, out, n, rule) for case, out in runs]
@@ -185,10 +182,6 @@ def score(
     present = [n for n in problem.channels if counts[n].sum() > 0]
     sums, counts = ({n: by_block[n][used] for n in present} for by_block in (sums, counts))
     return Score(sums, counts, max(missed, default=0.0), run[used])
-
-
-def _has_ft(case: Case, outputs: Mapping[str, FloatArray]) -> bool:
-    return "ft" in case.measured and "ft" in outputs
 
 
 def _by_block(

@@ -71,7 +71,8 @@ class ForwardStep:
     def run(self) -> StepResult:
         """Try every effect, and two at once where none helps alone."""
         screened = self.fits.screen(self.fits.on_pieces)
-        close = self._fit_to_pieces(screened)
+        best = screened[: self.settings.forward.piece_fits]  # also where no step helped: a guess may be poor
+        close = sorted(self.fits.fit_pieces(best), key=lambda s: s.cost)
         finalists = self._finalists(screened, close)
         models = self.fits.fit_all(finalists)
         if self.fits.is_far and all(
@@ -83,7 +84,8 @@ class ForwardStep:
         if chosen is not None and is_off_rig(chosen.solution):
             contenders += self._pairs_nearer_the_rig(chosen, close)
             chosen = self._choose(contenders)
-        trials = [self._far_behind(s) for s in _others(screened, finalists)]
+        near = {s.name for s in finalists}
+        trials = [self._far_behind(s) for s in screened if s.name not in near]
         trials += [self._refusal(m, chosen) for m in models if m is not chosen]
         return StepResult(chosen, trials)
 
@@ -98,14 +100,6 @@ class ForwardStep:
     def _choose(self, models: Sequence[Candidate]) -> Candidate | None:
         """Return the model to accept."""
         return break_tie(models, self.current.validation, self.settings)
-
-    def _fit_to_pieces(self, screened: Sequence[ScreenedEffect]) -> list[ScreenedEffect]:
-        """Return the best of the screening fitted to the pieces, best first.
-
-        Also where no step helped: the guess may have been poor.
-        """
-        best = screened[: self.settings.forward.piece_fits]
-        return sorted(self.fits.fit_pieces(best), key=lambda s: s.cost)
 
     def _finalists(
         self, screened: Sequence[ScreenedEffect], close: Sequence[ScreenedEffect]
@@ -187,11 +181,6 @@ def _look_alikes(effect: Effect, effects: Sequence[Effect]) -> set[str]:
     confusable, size = effect.claims.confusable_with, effect_size(effect.name)
     alike = look_alikes(effect.name, effects)
     return {e.name for e in alike if e.name in confusable or effect_size(e.name) <= size}
-
-
-def _others(screened: Sequence[ScreenedEffect], chosen: Sequence[ScreenedEffect]) -> list[ScreenedEffect]:
-    names = {s.name for s in chosen}
-    return [s for s in screened if s.name not in names]
 
 
 def select_stepwise(

@@ -155,7 +155,8 @@ def undetermined_remarks(unknowns: Sequence[Unknown], confidence: Confidence) ->
     if not index:
         return tuple(remarks)
     reach = np.array([unknowns[i].reach for i in index])
-    size = np.array([_size(unknowns[i], float(theta[i])) for i in index])
+    pairs = [(unknowns[i], abs(float(theta[i]))) for i in index]  # near 0 a typical size is the reference
+    size = np.array([1.0 if u.logarithmic else max(value, 0.1 * u.scale) for u, value in pairs])
     scaled = _without_the_rest(confidence.information, index) * np.outer(reach, reach)
     values, vectors = np.linalg.eigh(scaled)
     for vector in vectors[:, values < 1.0].T:
@@ -201,11 +202,6 @@ def _without_the_rest(information: FloatArray, index: Sequence[int]) -> FloatArr
         chosen - cross @ np.linalg.pinv(information[np.ix_(rest, rest)], hermitian=True) @ cross.T
     )
     return result
-
-
-def _size(unknown: Unknown, coordinate: float) -> float:
-    """Return the reference of a change of the coordinate: the value, or near 0 its typical size."""
-    return 1.0 if unknown.logarithmic else max(abs(coordinate), 0.1 * unknown.scale)
 
 
 def _remark(unknowns: Sequence[Unknown], moved: FloatArray) -> Remark:

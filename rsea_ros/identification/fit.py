@@ -13,7 +13,7 @@ the misfit is credible, and its estimates widen the intervals (model averaging, 
 most careful form: the span). Only the diagnosis decides which law it is.
 """
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import PurePath
 
@@ -169,31 +169,21 @@ def _better_start(problem: Problem, start: Rig | None, run: Map) -> FloatArray:
 def unknowns_of(rig: Rig, cases: Sequence[Case]) -> tuple[Unknown, ...]:
     """Return all that a fit of these cases may move."""
     channels = sorted({n for case in cases for n in case.measured})
-    stated = _stated_effects(rig, cases)
+    scale = scale_of(cases, rig) if rig.effects else Scale()
+    stated = [(effect_named(e.name).at(scale).widen(e.parameters), e.parameters) for e in rig.effects]
     effects = [unknowns_of_effect(e, start, rig.known | idle(e, rig)) for e, start in stated]
     own = [differs.values if (differs := rig.condition(case.source)) else {} for case in cases]
     records = {"", *(PurePath(case.source).name for case in cases)}
-    tells = (u for u in unknowns_of_rig(rig) if not u.name.startswith(_beside(rig, channels)))
+    silent: tuple[str, ...] = ()
+    if rig.motion == "measured":
+        silent = ("spring_end.",) if "ft" in channels else ("spring_end.", "spring.")
+    tells = (u for u in unknowns_of_rig(rig) if not u.name.startswith(silent))
     of_rig = [u for u in tells if not own or any(u.name not in values for values in own)]
     return (
         *(u for u in of_rig if u.name.partition("@")[2] in records),
         *(u for group in effects for u in group),
         *(clocks(channels, rig) if not is_inverse(rig) else ()),
     )
-
-
-def _beside(rig: Rig, channels: Collection[str]) -> tuple[str, ...]:
-    """Return the parts of a rig that channels along a measured motion say nothing of."""
-    if rig.motion != "measured":
-        return ()
-    return ("spring_end.",) if "ft" in channels else ("spring_end.", "spring.")
-
-
-def _stated_effects(rig: Rig, cases: Sequence[Case]) -> Iterator[tuple[Effect, Mapping[str, float]]]:
-    """Yield the effects that a rig states with their parameters; bounds suit the machine and hold these."""
-    scale = scale_of(cases, rig) if rig.effects else Scale()
-    for e in rig.effects:
-        yield effect_named(e.name).at(scale).widen(e.parameters), e.parameters
 
 
 SCATTER = 0.005

@@ -188,7 +188,7 @@ def _result(
         alternatives=tuple(other.name for other in others),
         coloured=tuple(sorted({n for c in cases for n in c.coloured})),
         correlation=confidence.correlation,
-        residual_rms={n: _rms(e) for n, (e, _) in errors.items()},
+        residual_rms={n: float(np.sqrt(np.mean(e**2))) for n, (e, _) in errors.items()},
         noise_rms={n: float(np.mean([c.noise[n] for c in cases if n in c.noise])) for n in errors},
         fit_percent={n: fit_percent(e, y) for n, (e, y) in errors.items()},
         responses=responses,
@@ -204,7 +204,3 @@ def _result(
         notes=tuple(note for r in records for note in r.notes),
         faults=tuple(fault for r in records for fault in r.faults),
     )
-
-
-def _rms(values: FloatArray) -> float:
-    return float(np.sqrt(np.mean(values**2)))

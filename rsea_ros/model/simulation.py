@@ -349,7 +349,9 @@ def build(rig: Rig, step: float, duration: float, *, in_loop: bool = False) -> M
     settings = [(effect_named(e.name), e.parameters) for e in rig.effects]
     rig = with_structure(rig)
     active = [(e, p) for e, p in settings if e.port != st.Port.STRUCTURE]
-    _check_sensor(rig, active)
+    for e, _ in active:  # the step adds the torque of one in the spring, where the sensor is not
+        if rig.ft_end == "housing_end" and e.port == st.Port.SPRING:
+            raise RigError(f"rig {rig.name}: effect {e.name} with ft_end = housing_end, expected spring_end")
     reads = frozenset(r for e, _ in active for r in e.reads)
     ends = rig.clamped, rig.proximal, rig.ft_end, rig.encoder_end, rig.beside_spring
     body = _Body(rig, (*rig.values().items(), *ends, rig.train, rig.rigid_spring, rig.linear))
@@ -385,15 +387,6 @@ def _linear_part(
     falling = mechanics(rig, linear_gravity=False)
     linear = propagator(rig, step, reads, falling)
     return linear, mechanics(rig) if any(rig[f"{end}.gravity"] for end in END_NAMES) else falling, {}
-
-
-def _check_sensor(rig: Rig, active: Sequence[tuple[Effect, Mapping[str, float]]]) -> None:
-    """Raise RigError for an effect in the spring where the F/T sensor is not: the step adds its torque."""
-    for effect, _ in active:
-        if rig.ft_end == "housing_end" and effect.port == st.Port.SPRING:
-            raise RigError(
-                f"rig {rig.name}: effect {effect.name} with ft_end = housing_end, expected spring_end"
-            )
 
 
 def _constants(rig: Rig) -> tuple[float, float, float, float]:

@@ -55,7 +55,9 @@ def cause_of(
     where its residual falls.
     """
     (without, with_it), effect = step, effect_named(step[1].added)
-    channel = _helped_channel(without.test, with_it.test, channel)
+    before, after = without.test, with_it.test
+    if not before.ratio(channel) > _FALL * after.ratio(channel):  # then the one whose residual falls most
+        channel = max(before.sums, key=lambda n: before.ratio(n) / max(after.ratio(n), 1e-12))
     held_out, interval = gain(with_it.test, without.test, channel, settings.acceptance.resamples)
     train, _ = gain(with_it.train, without.train, channel)
     return Cause(
@@ -71,13 +73,6 @@ def cause_of(
 _FALL = 1.02
 """Ratio by which a channel's residual must fall for the gain to speak of it: less is what acceptance.matters
 calls nothing."""
-
-
-def _helped_channel(without: Score, with_it: Score, channel: str) -> str:
-    """Return a channel if its residual falls, else the one whose residual falls most."""
-    if without.ratio(channel) > _FALL * with_it.ratio(channel):
-        return channel
-    return max(without.sums, key=lambda n: without.ratio(n) / max(with_it.ratio(n), 1e-12))
 
 
 def alternative_of(

@@ -157,17 +157,13 @@ def _responses(problem: Problem, theta: FloatArray, effect: Effect) -> list[Floa
     if any(s is None for s in signals):
         return []
     parts = [
-        _spline(s, effect, _hold(c), _spans(c, s))
+        _spline(s, effect, c.drive.hold if isinstance(c.drive, Drive) else 1, _spans(c, s))
         for s, c in zip(signals, problem.cases, strict=True)
         if s is not None
     ]
     zero = problem.residual_of(base)
     contributions = ([make() for make in alike] for alike in zip(*parts, strict=False))
     return [problem.residual_of(_with_part(problem, theta, base, effect, p)) - zero for p in contributions]
-
-
-def _hold(case: Case) -> int:
-    return case.drive.hold if isinstance(case.drive, Drive) else 1
 
 
 def _spans(case: Case, signal: FloatArray) -> Sequence[tuple[int, int]]:

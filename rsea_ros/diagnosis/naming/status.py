@@ -54,11 +54,12 @@ def features(e: Evidence, preferred: bool, settings: DiagnosisSettings = DEFAULT
     leaves only noise. flexible: sure gain of a spline beside it. edge: a parameter is at a bound.
     """
     s, flexible = e.signature, e.flexible
-    bent = max(s.amplitude, s.time, s.frequency)
+    bent, inside = max(s.amplitude, s.time, s.frequency), min(max(e.weight, 1e-9), 1.0 - 1e-9)
+    log_odds = min(max(math.log(inside / (1.0 - inside)), -_SUREST), _SUREST)
     return {
         INTERCEPT: 1.0,
         "shape": 0.5 * (_relative(s.overall) + _relative(bent)),
-        "rivals": _log_odds(e.weight) / max(e.left, 1.0),
+        "rivals": log_odds / max(e.left, 1.0),
         "preferred": float(preferred),
         "noise": float(e.left <= settings.floor.reached),
         "flexible": flexible.gain if flexible and flexible.ci95[0] > 0.0 else 0.0,
@@ -69,11 +70,6 @@ def features(e: Evidence, preferred: bool, settings: DiagnosisSettings = DEFAULT
 def _relative(spread: float) -> float:
     """Return the logarithm of a spread of lambda over 0.1."""
     return math.log((_LEAST_SPREAD + min(spread, _MOST_SPREAD)) / 0.1)
-
-
-def _log_odds(weight: float) -> float:
-    inside = min(max(weight, 1e-9), 1.0 - 1e-9)
-    return min(max(math.log(inside / (1.0 - inside)), -_SUREST), _SUREST)
 
 
 def probability(

@@ -34,11 +34,6 @@ from rsea_ros.records.record import HUGE, FloatArray, Record, is_measured
 ADDRESS, ROWS, COLUMNS = range(3)
 
 
-def handle_of(model: FilterModel, state: FilterState, log: logs.Log) -> npt.NDArray[np.int64]:
-    """Return address and shape of every array, shape (arrays, 3). The arrays must outlive it."""
-    return np.array([_row(array) for array in _arrays((model, state, log))], dtype=np.int64)
-
-
 def _arrays(parts: Sequence[Any]) -> Iterator[Any]:
     for part in parts:
         if isinstance(part, tuple):
@@ -222,7 +217,8 @@ class Observer:
             self._rig, self._noise, hold=self._hold, duration=self._duration, learns=self._learns
         )
         self._log = logs.empty_log(len(self._state.whole))
-        self._handle = handle_of(self._model, self._state, self._log)
+        arrays = _arrays((self._model, self._state, self._log))  # they must outlive the handle
+        self._handle = np.array([_row(array) for array in arrays], dtype=np.int64)
         self._rest, self._reads_load = self._model.linear.rest, self._model.linear.reads_load
         self._score, self._newest = np.zeros((3, 3)), math.nan
         self.restarts += 1
