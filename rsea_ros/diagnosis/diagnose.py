@@ -27,7 +27,8 @@ from rsea_ros.identification.identify import lost_behind
 from rsea_ros.identification.problem import Problem, case_from
 from rsea_ros.identification.result import Remark
 from rsea_ros.identification.solver import Pools, worker_pools
-from rsea_ros.identification.start import joint_start, scale_of
+from rsea_ros.identification.start import joint_start, scale_of, settled_starts
+from rsea_ros.identification.unknowns import start_vector
 from rsea_ros.model.extent import bound_values
 from rsea_ros.model.position_loop import with_command
 from rsea_ros.model.rig import Rig
@@ -86,7 +87,8 @@ def nominal_problem(
     """Return the fit of a rig to checked records: the nominal model."""
     cases = tuple(case_from(c.record, rig, c.masked) for c in checked)
     stated = frozenset(e.name for e in rig.effects)
-    return Problem(cases, rig, unknowns_of(rig, cases), MEASURED, stated=stated)
+    problem = Problem(cases, rig, unknowns_of(rig, cases), MEASURED, stated=stated)
+    return settled_starts(problem, start_vector(problem.unknowns))[0]
 
 
 def _check_testable(holdout: Checked, nominal: Problem) -> None:

@@ -32,12 +32,11 @@ from rsea_ros.identification.clocks import (
     without_needless,
 )
 from rsea_ros.identification.confidence import Confidence, confidence_of, interval
-from rsea_ros.identification.load_starts import with_load_starts
 from rsea_ros.identification.noise_level import reestimate_noise
 from rsea_ros.identification.problem import Case, Problem, case_from, weighted_residual, with_noise_along
 from rsea_ros.identification.result import Remark
 from rsea_ros.identification.solver import Map, Pools, Solution, serial, solve
-from rsea_ros.identification.start import scale_of
+from rsea_ros.identification.start import scale_of, settled_starts
 from rsea_ros.identification.unknowns import (
     Unknown,
     apply,
@@ -83,8 +82,6 @@ def reweight(case: Case, ratios: Mapping[str, float]) -> Case:
 
 
 _REWEIGHTINGS = 3
-_SETTLINGS = 3
-"""Fits in turn with the states in which a moving load begins anew behind gaps."""
 _OTHER_NOISE = 1.1
 """Ratio of a channel's noise after a fit to that before, from which the fit is repeated."""
 
@@ -108,15 +105,8 @@ def fit(
         first = solve(rest, _better_start(rest, start, run), run=run)
         start = apply(rig, rest.unknowns, first.theta)[0]
     begin = _better_start(problem, start, run)
-    unsettled, problem = problem, with_load_starts(problem, begin)
-    solution = solve(problem, begin, run=run)
-    if problem is not unsettled:
-        for _ in range(_SETTLINGS):
-            problem = with_load_starts(problem, solution.theta)
-            solution = solve(problem, solution.theta, run=run)
-        problem = with_load_starts(problem, solution.theta)
-        problem = replace(problem, cases=tuple(replace(c, start_shows=None) for c in problem.cases))
-        solution = solve(problem, solution.theta, run=run)
+    solution = solve(*settled_starts(problem, begin, run), run=run)
+    problem = solution.problem
     outputs = problem.outputs(solution.theta)
     known = with_noise_of(problem.cases, solution, outputs)
     changes = [b.noise[n] / a.noise[n] for a, b in zip(cases, known, strict=True) for n in a.noise]

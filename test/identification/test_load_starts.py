@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from rsea_ros import simulate
+from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.identification.identify import identify
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.records.record import Channel
@@ -34,9 +35,11 @@ def test_rows_that_a_recorder_lost_are_no_misfit_where_the_output_moves(gaps, le
     """Three lost rows of thousands made ft 230 times its noise, and no value had an interval."""
     true = FREE.with_values({"spring.stiffness": 290.0, "rotor.reflected_inertia": 0.055})
     torque = np.repeat(5.0 * np.random.default_rng(1).standard_normal(1050), 4)
-    result = identify([with_gaps(simulate(true, torque, 280.0, seed=2), gaps, length)], FREE)
+    record = with_gaps(simulate(true, torque, 280.0, seed=2), gaps, length)
+    result = identify([record], FREE)
     assert result.verdict == "adequate"
     assert max(result.times_noise.values()) < 1.15
     for p in result.parameters:
         if p.name in ("spring.stiffness", "rotor.reflected_inertia"):
             assert not p.beside_misfit and p.value == pytest.approx(true[p.name], rel=0.01)
+    assert diagnose([record], FREE).verdict == "nothing_wrong"
