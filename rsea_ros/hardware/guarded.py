@@ -182,12 +182,7 @@ class GuardedDevice:
         for losses in self._losses.values():
             losses.clear()
         try:
-            if self.device.protection.kind == NONE and not unprotected:
-                raise ParameterError(
-                    "nothing ends the torque of this device when the driver's process dies: dead-host"
-                    " protection none, expected a bus watchdog or a supervisor, or parameter"
-                    " allow_no_dead_host_protection = true"
-                )
+            self._check_protection(unprotected=unprotected)
             self._rating = self.device.rating if isinstance(self.device, Rated) else UNRATED
             if self._derive is not None:
                 self._limits = self._derive(self._rating)
@@ -197,6 +192,14 @@ class GuardedDevice:
             self.device.close()
             raise
         self.guard.clear()
+
+    def _check_protection(self, *, unprotected: bool) -> None:
+        if self.device.protection.kind == NONE and not unprotected:
+            raise ParameterError(
+                "nothing ends the torque of this device when the driver's process dies: dead-host protection"
+                " none, expected a bus watchdog or a supervisor, or parameter"
+                " allow_no_dead_host_protection = true"
+            )
 
     def _check_measured(self) -> None:
         """Raise ParameterError for a limit of a quantity that the device does not measure.

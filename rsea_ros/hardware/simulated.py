@@ -37,8 +37,7 @@ class SimulatedDevice:
         self, rig: Rig, rate: float, *, seed: int = 0, noise: bool = True, duration: float = 60.0,
         clock: Callable[[], int] | None = None,
     ) -> None:  # fmt: skip
-        epoch = time.time_ns() - time.monotonic_ns()  # on from it evenly when the system clock is set
-        self._rig, self._clock = rig, clock or (lambda: epoch + time.monotonic_ns())
+        self._rig, self._clock = rig, clock or _steady_clock()
         self._sensors = Sensors(rig if noise else replace(rig, sensors={}))
         self._rng = np.random.default_rng(seed)
         self._period, self._per_second = 1.0 / rate, rate * steps_per_sample(1.0 / rate)
@@ -144,3 +143,9 @@ class SimulatedDevice:
             self._writes = []
         self._torque = last
         return held
+
+
+def _steady_clock() -> Callable[[], int]:
+    """Return a clock with the system clock's time that goes on evenly when that is set."""
+    epoch = time.time_ns() - time.monotonic_ns()
+    return lambda: epoch + time.monotonic_ns()

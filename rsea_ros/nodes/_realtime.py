@@ -64,8 +64,7 @@ class Worker:
         raise NotImplementedError
 
     def _keep_error(self) -> None:
-        # Linux ends a thread's timers up to 50 us late, also the wait for Python's interpreter lock.
-        ctypes.CDLL(None).prctl(SET_TIMER_SLACK, 1, 0, 0, 0)
+        exact_timers()
         try:
             self.run()
         except Exception as error:  # handed to the main thread by `is_running`
@@ -122,6 +121,12 @@ def raise_new_threads() -> None:
         with suppress(ProcessLookupError):  # it has ended meanwhile
             if os.sched_getparam(thread).sched_priority != level:
                 _schedule(thread, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, level)
+
+
+def exact_timers() -> None:
+    """Let the timers of the calling thread end when they are due: Linux adds up to 50 us, also to the wait
+    for Python's interpreter lock."""
+    ctypes.CDLL(None).prctl(SET_TIMER_SLACK, 1, 0, 0, 0)
 
 
 def stop_keeping_time(values: Mapping[str, Any]) -> None:

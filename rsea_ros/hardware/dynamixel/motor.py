@@ -252,12 +252,17 @@ class Motor(BusMotor):
     def _supervise(self) -> None:
         """Start a supervisor for a motor without a watchdog, and a new one for one that is dead."""
         if isinstance(self.protection, Supervised):
-            identity, table = self._settings.identity, self.control_table
-            stops = ([WRITE, *item.address.to_bytes(2, "little"), *item.data(0)]
-                     for item in (table.goal_torque, table.torque_enable))  # fmt: skip
+            identity = self._settings.identity
             replies = [frame(identity, bytes([STATUS, error])) for error in (0, ALERT)]
-            frames = [frame(identity, bytes(stop)) for stop in stops]
-            self.protection.guard(self.port.descriptor, frames, replies)
+            self.protection.guard(self.port.descriptor, stop_frames(self.control_table, identity), replies)
+
+
+def stop_frames(table: ControlTable, identity: int) -> list[bytes]:
+    """Return the frames that zero the torque of a motor and switch it off, for a supervisor."""
+    return [
+        frame(identity, bytes([WRITE, *item.address.to_bytes(2, "little"), *item.data(0)]))
+        for item in (table.goal_torque, table.torque_enable)
+    ]
 
 
 def _table(model: int, settings: MotorConnection) -> ControlTable:

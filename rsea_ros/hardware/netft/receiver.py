@@ -133,9 +133,7 @@ class DatagramReceiver:
             self.refused["length"] += 1
         elif self.sequence.accept(record):
             stamp = _arrival_stamp(ancillary)
-            now, ago = time.monotonic_ns(), time.time_ns() - stamp
-            steady = now - ago if 0 <= ago <= LONGEST_AGO else now  # else the system clock was set since
-            arrival = Arrival(stamp, record, steady)
+            arrival = Arrival(stamp, record, _monotonic(stamp))
             self._waiting.append(arrival)
             if (aside := self._aside) is not None:
                 aside.append(arrival)
@@ -159,6 +157,12 @@ def _until_stamped() -> None:
             time.sleep(1e-3)
             if _arrival_stamp(probe.recvmsg(1, ANCILLARY)[1]) <= sent:
                 return
+
+
+def _monotonic(stamp: int) -> int:
+    """Return a stamp of just now on the monotonic clock; now where the system clock was set since."""
+    now, ago = time.monotonic_ns(), time.time_ns() - stamp
+    return now - ago if 0 <= ago <= LONGEST_AGO else now
 
 
 def _arrival_stamp(ancillary: list[tuple[int, int, bytes]]) -> int:
