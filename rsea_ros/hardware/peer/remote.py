@@ -23,14 +23,17 @@ class RemoteBench:
     def __init__(self, path: Path, *options: object) -> None:
         path = path.absolute()
         words = [str(o.absolute() if isinstance(o, Path) else o) for o in ("--port", path, *options)]
-        self._process = subprocess.Popen(
-            [sys.executable, "-m", "rsea_ros", "bench", "--requests", *words], cwd=ROOT,
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True,
-        )  # fmt: skip
+        self._process = self._begin(["bench", "--requests", *words])
         place = self._receive()
         self.port, self.ft_port, self.page_port = str(path), int(place["ft_port"]), int(place["page_port"])
         self.launch = str(place["launch"])
         self._more = {n: value for n, value in place.items() if n.startswith(("encoder", "can", "device"))}
+
+    def _begin(self, words: list[str]) -> subprocess.Popen[bytes]:
+        return subprocess.Popen(
+            [sys.executable, "-m", "rsea_ros", *words], cwd=ROOT,
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True,
+        )  # fmt: skip
 
     def __enter__(self) -> RemoteBench:
         return self

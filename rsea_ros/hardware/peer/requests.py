@@ -43,8 +43,7 @@ class LineRequests:
         self.descriptor, self._outlet, self._text = inlet, outlet, b""
         self.pauses: deque[tuple[int, int]] = deque(maxlen=KEPT)
         self._does: dict[str, Callable[[int, Request], object]] = {
-            "misbehave": self._misbehave, "set": self._set, "sag": self._sag,
-            "alert": lambda now, r: self._motor.shut_down(now, int(r["bits"])),
+            "misbehave": self._misbehave, "set": self._set, "alert": self._alert, "sag": self._sag,
             "vanish": lambda now, r: bus.vanish(), "appear": lambda now, r: bus.appear(r.get("name", "")),
             "ft_gap": lambda now, r: sensor.gap(int(r["records"])),
             "ft_restart": lambda now, r: sensor.restart(),
@@ -64,10 +63,13 @@ class LineRequests:
             answer = self._do(now, line)
             if answer is None:
                 return False
-            text = memoryview(json.dumps(answer).encode() + b"\n")
-            while text:
-                text = text[os.write(self._outlet, text) :]
+            self._tell(answer)
         return bool(data)
+
+    def _tell(self, answer: dict[str, Any]) -> None:
+        text = memoryview(json.dumps(answer).encode() + b"\n")
+        while text:
+            text = text[os.write(self._outlet, text) :]
 
     def _do(self, now: int, line: bytes) -> dict[str, Any] | None:
         try:
@@ -96,6 +98,9 @@ class LineRequests:
             self._motor.hold(now)
         for name in set(request) - {"do"}:
             self._motor.put(name, int(request[name]))
+
+    def _alert(self, now: int, request: Request) -> None:
+        self._motor.shut_down(now, int(request["bits"]))
 
     def _sag(self, now: int, request: Request) -> None:
         self._motor.put("voltage", round(10 * float(request["voltage"])))
