@@ -1,5 +1,7 @@
 """Runs of simulated rigs, and the causes that a diagnosis tries, as the tests of the science need them."""
 
+from dataclasses import replace
+
 import numpy as np
 
 import rsea_ros as rsea
@@ -10,6 +12,21 @@ from rsea_ros.records.record import Channel, Record
 
 RATE = 280.0
 RIG = rsea.load_rig("paper_high_impedance")
+_LIGHT = RIG.with_values({
+    "rotor.reflected_inertia": 0.06, "rotor.reflected_damping": 0.5, "spring.stiffness": 270.0,
+    "spring.damping": 0.3,
+}).quantities  # fmt: skip
+FREE = replace(RIG, clamped=frozenset({"housing_end"}), quantities={
+    **_LIGHT, "spring_end.inertia": replace(_LIGHT["rotor.reflected_inertia"], value=0.13),
+    "spring_end.damping": replace(_LIGHT["rotor.reflected_damping"], value=0.3),
+})  # fmt: skip
+"""A light rotor and a load that moves."""
+
+
+def free_run(rig=FREE):
+    """Return 15 s of a rig whose command is new in every fourth sample."""
+    torque = np.repeat(5.0 * np.random.default_rng(1).standard_normal(1050), 4)
+    return rsea.simulate(rig, torque, RATE, seed=2)
 
 
 def command_of(kind="white_noise", rate=RATE, **settings):

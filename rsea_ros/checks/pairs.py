@@ -266,7 +266,8 @@ def _parts(record: Record, law: Law) -> list[Pair]:
     start, stop = max(y.t[0], x.t[0]), min(y.t[-1], x.t[-1])
     shared: list[Pair] = []
     if min(len(y), len(x), len(less)) >= 64 and stop - start > _SHORTEST:
-        shared = _in_parts(lambda a, b: _share(y, x, less, law, a, b), float(start), float(stop), list)
+        both = Signals(y, less, *map(_thinned, (y, less)))
+        shared = _in_parts(lambda a, b: _share(both, x, law, a, b), float(start), float(stop), list)
     if not shared or not all(p.fits and p.clear for p in shared):
         shared = [Pair(law, float(start), float(stop))]
     found = []
@@ -327,13 +328,13 @@ def _in_parts(
     return [_joined(run, measure) for run in runs]
 
 
-def _share(y: Channel, x: Channel, less: Channel, law: Law, start: float, stop: float) -> Pair:
+def _share(both: Signals, x: Channel, law: Law, start: float, stop: float) -> Pair:
     """Return the pair of a torque and the one that is to be taken off it, over a span, s.
 
     1 = P(i w) x / y + g exp(-i w lag) less / y at each line, with real coefficients of P, and g.
     """
-    pair = _measure(Signals(y, less, *map(_thinned, (y, less))), _loose(law), start, stop)
-    pair = replace(pair, fits=False)
+    pair = replace(_measure(both, _loose(law), start, stop), fits=False)
+    y, less = both.y, both.x
     fast = max(*(1.0 / c.rate for c in (y, x, less)), 1.0 / _FINEST)
     y = Channel(y.t + 0.5 / y.rate, y.y) if law.y == "command" else y  # it holds
     of_x = _response(y, x, law, (start, stop), fast, 0.0)

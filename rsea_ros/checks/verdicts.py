@@ -404,7 +404,8 @@ def _geared(ratio: float, rig: Rig) -> Finding:
         "amber", "wrong_rig", "gear.ratio", off, "1", expected=f"{rig['gear.ratio']:.4g}",
         detail=f"angles are {off:.3g} times and torques 1/{off:.3g} of what ft and the rig make them: "
         "the drive's own side of a gear of about this ratio",
-        remedy=f"publish at its output: `scale: {1.0 / off:.3g}` for angles, `scale: {off:.3g}` for torques",
+        remedy=f"`scale: {1.0 / off:.3g}` for angles and `scale: {off:.3g}` for torques in the import map, "
+        "or publish SI at the gear output",
     )  # fmt: skip
 
 

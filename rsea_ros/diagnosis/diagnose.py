@@ -84,7 +84,7 @@ def diagnose(
 def nominal_problem(
     checked: Sequence[Checked], rig: Rig, settings: DiagnosisSettings = DEFAULT
 ) -> Problem:
-    """Return the fit of a rig to checked records: the nominal model."""
+    """Return the fit of a rig to checked records, the nominal model; moving loads begin where it has them."""
     cases = tuple(case_from(c.record, rig, c.masked) for c in checked)
     stated = frozenset(e.name for e in rig.effects)
     problem = Problem(cases, rig, unknowns_of(rig, cases), MEASURED, stated=stated)
@@ -94,7 +94,7 @@ def nominal_problem(
 def _check_testable(holdout: Checked, nominal: Problem) -> None:
     """Raise IdentificationError where a held-out record has no channel that models are fitted to."""
     fitted = sorted({n for case in nominal.cases for n in case.measured})
-    (case,) = nominal_problem([holdout], nominal.rig).cases
+    case = case_from(holdout.record, nominal.rig, holdout.masked)
     if not case.measured.keys() & set(fitted):
         raise IdentificationError(
             f"{case.source}: held out, but has only {', '.join(sorted(case.measured))}; expected one of the"

@@ -272,16 +272,22 @@ def with_unknown_start(problem: Problem, theta: FloatArray) -> Problem:
 def _start_shows(case: Case, rig: Rig, clocks: Clocks, problem: Problem) -> FloatArray | None:
     if not isinstance(case.drive, Drive):
         return None
-    drives = (case.drive, *_other_starts(case.drive, case.noise))
-    moved = [replace(case, drive=drive, start_shows=None) for drive in drives]
-    outputs = simulate_cases(moved, rig, clocks, on_angle=problem.on_angle)[0]
-    channels = problem.present(case)
-    base, *others = [weighted_residual(c, out, channels) for c, out in zip(moved, outputs, strict=True)]
-    columns = np.column_stack([other - base for other in others])
+    columns = changed_by_starts(case, [*_other_starts(case.drive, case.noise)], rig, clocks, problem)[1]
     size = np.linalg.norm(columns, axis=0)
     columns = columns[:, np.isfinite(size) & (size > 0.0)]
     left, shares, _ = np.linalg.svd(columns / np.linalg.norm(columns, axis=0), full_matrices=False)
     return np.asarray(left[:, shares > _SAME])
+
+
+def changed_by_starts(
+    case: Case, drives: Sequence[Drive], rig: Rig, clocks: Clocks, problem: Problem
+) -> tuple[FloatArray, FloatArray]:
+    """Return the residual of a case, shape (m,), and what each of other drives adds, shape (m, drives)."""
+    moved = [replace(case, drive=drive, start_shows=None) for drive in (case.drive, *drives)]
+    outputs = simulate_cases(moved, rig, clocks, on_angle=problem.on_angle)[0]
+    channels = problem.present(case)
+    base, *others = (weighted_residual(c, out, channels) for c, out in zip(moved, outputs, strict=True))
+    return base, np.column_stack([other - base for other in others])
 
 
 _SAME = 1e-3

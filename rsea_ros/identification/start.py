@@ -1,4 +1,4 @@
-"""Where a fit begins: responses, joint starts of several records, and the machine's scale.
+"""Where a fit begins, and where a load does behind gaps: responses, joint starts, and the machine's scale.
 
 An output error of hundreds of times the noise has many minima; the logarithm of a response has hardly any,
 
@@ -25,7 +25,7 @@ import numpy as np
 from rsea_ros.effects.parameter import STIFFNESS, TORQUE, Scale, scale_to
 from rsea_ros.errors import RseaError
 from rsea_ros.identification.frequency_response import model_response
-from rsea_ros.identification.problem import Case, Problem, simulate_cases, weighted_residual
+from rsea_ros.identification.problem import Case, Problem, changed_by_starts
 from rsea_ros.identification.result import FrequencyResponse
 from rsea_ros.identification.solver import Map, descend, serial, solve
 from rsea_ros.identification.unknowns import Clocks, apply, start_vector, unknowns_of_rig
@@ -207,7 +207,7 @@ def _quantile(values: FloatArray) -> float:
     return float(np.quantile(np.abs(values), LARGEST)) if len(values) else 0.0
 
 
-_TELL = 16
+_FEWEST_BEHIND = 16
 """Samples behind a gap that tell a state."""
 _APART = 0.03
 """s, over which a rate is known to the noise of its sensor: the size of the changes for derivatives."""
@@ -240,7 +240,7 @@ def with_load_starts(problem: Problem, theta: FloatArray) -> Problem:
     record has a gap, or no output moves.
     """
     rig, clocks = apply(problem.rig, problem.unknowns, theta)
-    cases = tuple(_started(case, rig.under(case.source), clocks, problem) for case in problem.cases)
+    cases = tuple(_started(case, rig, clocks, problem) for case in problem.cases)
     same = all(a is b for a, b in zip(cases, problem.cases, strict=True))
     return problem if same else replace(problem, cases=cases)
 
@@ -249,23 +249,21 @@ def _started(case: Case, rig: Rig, clocks: Clocks, problem: Problem) -> Case:
     drive, channel = case.drive, next((n for n in ("deflection", "ft") if n in case.measured), "")
     if not isinstance(drive, Drive) or not channel or not any(k > 0 for k, _ in drive.restarts):
         return case
-    if rig.rigid_spring or mechanics(rig).order < 2:
+    if rig.rigid_spring or mechanics(rig.under(case.source)).order < 2:
         return case
     states = np.array([_state(case, channel, k, drive.step, state) for k, state in drive.restarts])
     off = case.noise.get("position", 1e-4), case.noise[channel]
     sizes = np.array([off[0], off[0] / _APART, off[1], off[1] / _APART])
-    tried = [states, *(states + size * direction for size, direction in zip(sizes, np.eye(4), strict=True))]
-    moved = [replace(case, drive=_beginning(drive, channel, one), start_shows=None) for one in tried]
-    outputs = simulate_cases(moved, rig, clocks, on_angle=problem.on_angle)[0]
+    own = replace(case, drive=_beginning(drive, channel, states))
+    others = [_beginning(drive, channel, states + change) for change in np.diag(sizes)]
+    base, columns = changed_by_starts(own, others, rig, clocks, problem)
     channels = problem.present(case)
-    base, *others = (weighted_residual(c, out, channels) for c, out in zip(moved, outputs, strict=True))
-    columns = np.column_stack([other - base for other in others])
     at = np.concatenate([(case.t[n][case.mask[n]] - drive.start) / drive.step for n in channels])
     ends = [*(k for k, _ in drive.restarts[1:]), len(drive.command)]
     shows = np.zeros((len(base), 4 * len(states)))
     for n, (row, (k, _), end) in enumerate(zip(states, drive.restarts, ends, strict=True)):
         inside = (at >= k) & (at < end) & np.isfinite(columns).all(axis=1) & np.isfinite(base)
-        if np.count_nonzero(inside) >= _TELL:
+        if np.count_nonzero(inside) >= _FEWEST_BEHIND:
             row -= sizes * np.linalg.lstsq(columns[inside], base[inside], rcond=_SHARES)[0]
             shows[inside, 4 * n : 4 * n + 4] = np.linalg.qr(columns[inside])[0]
     return replace(case, drive=_beginning(drive, channel, states), start_shows=shows)

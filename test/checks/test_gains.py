@@ -1,13 +1,13 @@
 """Sign, scale and smoothing are reported with their remedy; effects and strangers' rigs raise no alarm."""
 
 import functools
-from dataclasses import replace
 
 import numpy as np
 import pytest
 from independent.bench import drawn_bench, record_run
 from independent.hidden import hide
 from independent.severities import drawn_parameters
+from runs import FREE, free_run
 
 import rsea_ros as rsea
 from rsea_ros.checks.check import check_record
@@ -235,20 +235,7 @@ def test_two_channels_alone_show_their_contradiction_and_convict_none():
     assert finding.value == pytest.approx(3.4, rel=0.1)
 
 
-FREE = load_rig("paper_high_impedance").with_values({
-    "rotor.reflected_inertia": 0.06, "rotor.reflected_damping": 0.5, "spring.stiffness": 270.0,
-    "spring.damping": 0.3,
-})  # fmt: skip
-FREE = replace(FREE, clamped=frozenset({"housing_end"}), quantities={
-    **FREE.quantities, "spring_end.inertia": replace(FREE.quantities["rotor.reflected_inertia"], value=0.13),
-    "spring_end.damping": replace(FREE.quantities["rotor.reflected_damping"], value=0.3),
-})  # fmt: skip
 HEAVY = FREE.with_values({"rotor.reflected_inertia": 0.953, "spring_end.inertia": 3.0})
-
-
-def free_run(rig=FREE):
-    torque = np.repeat(5.0 * np.random.default_rng(1).standard_normal(1050), 4)
-    return rsea.simulate(rig, torque, 280.0, seed=2)
 
 
 @pytest.mark.parametrize(
@@ -286,7 +273,7 @@ def test_what_a_drive_reports_on_its_own_side_of_the_gear_is_one_factor(rig, run
     assert {(f.kind, f.channel) for f in said(record, stated)} == {("scale", n) for n in by}
 
 
-def test_a_torque_that_is_no_drive_s_is_told_beside_its_command():
+def test_a_motor_torque_that_is_not_its_command_is_told():
     """It was green, and the model fitted; intervals were withheld without a word."""
     torque = run()["motor_torque"]
     wrong = run().with_channels(motor_torque=Channel(torque.t, 2.5 * torque.y))

@@ -4,21 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from runs import FREE, free_run
 
-from rsea_ros import simulate
 from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.identification.identify import identify
-from rsea_ros.model.rig_file import load_rig
 from rsea_ros.records.record import Channel
-
-HELD = load_rig("paper_high_impedance").with_values({
-    "rotor.reflected_inertia": 0.06, "rotor.reflected_damping": 0.5, "spring.stiffness": 270.0,
-    "spring.damping": 0.3,
-})  # fmt: skip
-FREE = replace(HELD, clamped=frozenset({"housing_end"}), quantities={
-    **HELD.quantities, "spring_end.inertia": replace(HELD.quantities["rotor.reflected_inertia"], value=0.13),
-    "spring_end.damping": replace(HELD.quantities["rotor.reflected_damping"], value=0.3),
-})  # fmt: skip
 
 
 def with_gaps(record, gaps, length):
@@ -34,8 +24,7 @@ def with_gaps(record, gaps, length):
 def test_rows_that_a_recorder_lost_are_no_misfit_where_the_output_moves(gaps, length):
     """Three lost rows of thousands made ft 230 times its noise, and no value had an interval."""
     true = FREE.with_values({"spring.stiffness": 290.0, "rotor.reflected_inertia": 0.055})
-    torque = np.repeat(5.0 * np.random.default_rng(1).standard_normal(1050), 4)
-    record = with_gaps(simulate(true, torque, 280.0, seed=2), gaps, length)
+    record = with_gaps(free_run(true), gaps, length)
     result = identify([record], FREE)
     assert result.verdict == "adequate"
     assert max(result.times_noise.values()) < 1.15
