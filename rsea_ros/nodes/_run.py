@@ -1,8 +1,8 @@
 """How a node runs and ends.
 
-Fast DDS gives messages to listeners on the same machine through shared memory. For one that was stopped
-(SIGSTOP, a debugger) while it takes a message out, `publish` waits for a second or two, and rclpy keeps the
-interpreter meanwhile: the cycle stands still under torque.
+Through the shared memory of Fast DDS, `publish` waits a second or two, and keeps the interpreter, for one who
+listens and was stopped (SIGSTOP) while it takes a message out. And Fast DDS 3 asks a publisher for its type, once:
+where the question comes too soon, the node never hears it. So nodes use sockets, and ask for no types (381).
 """
 
 import faulthandler
@@ -39,27 +39,30 @@ PROFILE = "FASTDDS_DEFAULT_PROFILES_FILE"
 USERS = (PROFILE, "FASTRTPS_DEFAULT_PROFILES_FILE")
 OLDER = ("humble", "iron")
 """Distributions whose Fast DDS does not read PROFILE: it would be open to the network."""
-FILE = Path(__file__).with_name("localhost_sockets.xml")
+HERE = Path(__file__).with_name("localhost_sockets.xml")
 """Who may find the node is the same: this machine."""
+ANYWHERE = HERE.with_name("sockets.xml")
 
 
-def publish_by_sockets() -> None:
-    """Do so from the next participant on, unless the user has a profile of Fast DDS, or other middleware."""
+def use_sockets() -> None:
+    """From the next participant on. Found by this machine unless the user opens it: who finds may command.
+
+    A profile of Fast DDS that the user has, and other middleware, are left alone.
+    """
+    os.environ.setdefault(RANGE, LOCALHOST)
     if any(name in os.environ for name in USERS) or os.environ.get("ROS_DISTRO") in OLDER:
         return
     if not get_rmw_implementation_identifier().startswith("rmw_fastrtps"):
         return
-    if os.environ.get(RANGE) == LOCALHOST and PEERS not in os.environ and FILE.is_file():
-        os.environ[RANGE] = AS_PROFILE
-        os.environ[PROFILE] = str(FILE)
+    if os.environ[RANGE] == LOCALHOST and PEERS not in os.environ and HERE.is_file():
+        os.environ[RANGE], os.environ[PROFILE] = AS_PROFILE, str(HERE)
     else:
+        os.environ[PROFILE] = str(ANYWHERE)
         os.environ.setdefault("FASTDDS_BUILTIN_TRANSPORTS", "UDPv4")
 
 
 NAMESPACE = "rsea"
 SUCCESS, BAD_INPUT = 0, 2
-LOCAL = "ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST"
-"""Who may find a node unless the user says otherwise: this machine. Whoever finds it may command torque."""
 TICK = 0.1
 """s between looks at whether to stop, and whether the program has finished."""
 
@@ -84,7 +87,7 @@ class Component:
 
     endless: a signal of STOPPING is the regular end; any other end by a signal is an interruption (status
     128 plus its number).
-    more: parameters beside those of the table, from the given ones. waits_for_nobody: see publish_by_sockets.
+    more: parameters beside those of the table, from the given ones.
     patience: s from a signal to an end by force, of a node that leaves nothing undone; told is where it was.
     """
 
@@ -94,7 +97,6 @@ class Component:
     kind: type[Node] = Node
     endless: bool = True
     more: Callable[[Mapping[str, Any]], Sequence[NodeParameter]] = lambda given: ()
-    waits_for_nobody: bool = False
     patience: float = math.inf
 
     def run(self) -> int:
@@ -142,7 +144,7 @@ def run_nodes(components: Sequence[Component], arguments: Sequence[str] = ()) ->
     try:
         if math.isfinite(patience):
             listener = SignalListener(partial(faulthandler.dump_traceback_later, patience, exit=True))
-        _initialise(arguments, waits_for_nobody=any(each.waits_for_nobody for each in components))
+        _initialise(arguments)
         if effects := os.environ.get("RSEA_EFFECTS"):
             log.warning(f"RSEA_EFFECTS={printable(effects)}: code from there runs in this node")
         done = _work(sorted(components, key=lambda each: each.kind is Node), stop)  # drivers are first
@@ -221,13 +223,11 @@ def _raise(number: int, frame: FrameType | None) -> None:
     raise Stopped(number)
 
 
-def _initialise(arguments: Sequence[str], *, waits_for_nobody: bool = False) -> None:
+def _initialise(arguments: Sequence[str]) -> None:
     """Start ROS. Raises ParameterError for arguments that it cannot read."""
     if arguments:
         raise ParameterError(f"argument {arguments[0]!r}, expected --ros-args -p NAME:=VALUE (see --help)")
-    os.environ.setdefault(*LOCAL)
-    if waits_for_nobody:
-        publish_by_sockets()
+    use_sockets()
     try:
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     except RuntimeError as error:

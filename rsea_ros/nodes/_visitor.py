@@ -1,6 +1,5 @@
 """A node that visits a graph: it looks, listens, calls services (transitions, triggers) and leaves."""
 
-import os
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -15,7 +14,7 @@ from rclpy.signals import SignalHandlerOptions
 from msg_adapters import ros
 from rsea_ros.documents.wording import did_you_mean
 from rsea_ros.errors import ParameterError, RseaError
-from rsea_ros.nodes._run import LOCAL, NAMESPACE
+from rsea_ros.nodes._run import NAMESPACE, use_sockets
 
 DISCOVERY = 3.0
 """s within which whatever runs has been discovered."""
@@ -26,7 +25,7 @@ POLL = 0.05
 @contextmanager
 def visit(name: str) -> Iterator[Node]:
     """Yield a node that logs nowhere and offers no services; leave the graph afterwards."""
-    os.environ.setdefault(*LOCAL)
+    use_sockets()
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     node = Node(name, namespace=NAMESPACE, enable_rosout=False, start_parameter_services=False)
     try:

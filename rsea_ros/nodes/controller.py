@@ -301,7 +301,7 @@ class ControllerNode(Program):
             yield f"without the link's motion: {encoder.trouble or 'deflection was lost for a moment'}"
 
 
-NODE = Component("controller", TABLE, ControllerNode, waits_for_nobody=True)
+NODE = Component("controller", TABLE, ControllerNode)
 main = NODE.run
 
 if __name__ == "__main__":

@@ -253,9 +253,8 @@ class DriverNode(ManagedEntity, Program):
 
 
 NODE = Component(
-    "driver", TABLE, DriverNode, kind=LifecycleNode, more=lambda given: joint_table(TABLE, given),
-    waits_for_nobody=True,
-)  # fmt: skip
+    "driver", TABLE, DriverNode, kind=LifecycleNode, more=lambda given: joint_table(TABLE, given)
+)
 main = NODE.run
 
 if __name__ == "__main__":

@@ -21,7 +21,6 @@ from rsea_ros.errors import RseaError
 from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import simulate
-from rsea_ros.nodes._run import PROFILE
 from rsea_ros.records.record import Channel, Fault, Record
 from test.nodes.stalls import until
 from test.nodes.warm import parent
@@ -60,7 +59,6 @@ class Node:
 def _play(tmp_path, capsys, monkeypatch):
     """Play the demo until the plant does not stall, three times at most; return its directory and output."""
     monkeypatch.setattr("rsea_ros.cli._processes.start", Node)
-    monkeypatch.setenv(PROFILE, str(ROOT / "test" / "nodes" / "quick_repairs.xml"))
     monkeypatch.setattr(demo, "SHORT", 3.0)  # s of excitation instead of 20
     for k in range(3):
         out = tmp_path / f"demo{k}"

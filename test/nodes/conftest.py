@@ -16,7 +16,7 @@ from rclpy.lifecycle import LifecycleNode
 
 from msg_adapters.ros import Trigger
 from rsea_ros.nodes import driver
-from rsea_ros.nodes._run import PROFILE
+from rsea_ros.nodes._run import PROFILE, RANGE, use_sockets
 from rsea_ros.plugins import node_modules
 from test.nodes.warm import parent
 
@@ -29,9 +29,6 @@ HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 TIMEOUT = 60.0
 """Seconds for what normally takes one; a cold start compiles the simulation on a busy machine."""
-QUICK = {PROFILE: str(HERE / "quick_repairs.xml")}
-SOCKETS = "driver", "controller"
-"""Nodes that have a profile of their own."""
 AGAIN = 15.0
 """s without an answer, which no service takes."""
 LOOK = 0.004
@@ -45,8 +42,7 @@ class Process:
         words = [w for key, value in parameters.items() for w in ("-p", f"{key}:={as_argument(value)}")]
         words += [w for old, new in remaps.items() for w in ("-r", f"{old}:={new}")]
         self._log = log
-        quick = {} if name in SOCKETS else QUICK
-        environment = {**os.environ, **quick, "PYTHONPATH": str(ROOT), "ROS_LOG_DIR": str(log.parent / "ros")}
+        environment = {**os.environ, "PYTHONPATH": str(ROOT), "ROS_LOG_DIR": str(log.parent / "ros")}
         log.touch()
         files = os.devnull, log, log
         module = name if (HERE / f"{name}.py").is_file() else node_modules()[name]
@@ -119,8 +115,11 @@ class Listener:
     """A node in this process; it spins while it waits for something to be true."""
 
     def __init__(self, executor):
-        with pytest.MonkeyPatch.context() as patch:  # the first node of a process reads its profile
-            patch.setenv(PROFILE, QUICK[PROFILE])
+        with pytest.MonkeyPatch.context() as patch:
+            for name in (RANGE, PROFILE):  # the nodes of a test say so themselves
+                patch.setenv(name, os.environ.get(name, ""))
+            patch.delenv(PROFILE)
+            use_sockets()
             rclpy.init()
             self.node = rclpy.create_node("listener")
         self.executor = executor()

@@ -16,9 +16,8 @@ from rsea_ros.errors import DeviceError, ParameterError, RseaError
 from rsea_ros.nodes import _joint as module
 from rsea_ros.nodes._health import ERROR, OK, WARN, NodeHealth
 from rsea_ros.nodes._joint import DrivenJoint, _hardware, stop
-from rsea_ros.nodes._run import PROFILE
 from rsea_ros.nodes.joint import compose
-from test.nodes.conftest import QUICK, ROOT, as_argument, setting
+from test.nodes.conftest import ROOT, as_argument, setting
 from test.nodes.torque_loop import GAINS, Loop
 
 LARGEST = 250e6
@@ -35,7 +34,7 @@ def joint(listener, tmp_path_factory):
     """A driver, a controller and a model in a process that nothing else was loaded into."""
     words = [w for key, value in GIVEN.items() for w in ("-p", f"{key}:={as_argument(value)}")]
     command = [sys.executable, "-m", "rsea_ros.nodes.joint", "driver", "controller", "model", "--ros-args"]
-    environment = {**os.environ, PROFILE: QUICK[PROFILE], "PYTHONPATH": str(ROOT)}
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     environment["ROS_LOG_DIR"] = str(tmp_path_factory.mktemp("log"))
     topics = Loop(listener, stalls=("more than 1 sample late", "no usable measurement"))
     topics.start = lambda: subprocess.Popen([*command, *words], env=environment)

@@ -6,7 +6,7 @@ from xml.etree import ElementTree as XML
 
 import pytest
 
-from rsea_ros.nodes import _policies, _run, _run as _sockets
+from rsea_ros.nodes import _policies, _run
 from test.nodes.warm import parent
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -61,50 +61,50 @@ def test_joints_have_nodes_in_namespaces_that_command_their_own_joint_alone(monk
     assert "/rsea/driver" in paths and "/rsea/hip/controller" in paths
 
 
-@pytest.mark.parametrize(("given", "range_"), [(None, "LOCALHOST"), ("SUBNET", "SUBNET")])
-def test_nodes_are_found_from_this_machine_unless_the_user_opens_it(monkeypatch, given, range_):
-    variable = "ROS_AUTOMATIC_DISCOVERY_RANGE"
-    monkeypatch.delenv(variable) if given is None else monkeypatch.setenv(variable, given)
-    monkeypatch.setattr(_run.rclpy, "init", lambda **options: None)
-    _run._initialise([])
-    assert _run.os.environ[variable] == range_
-
-
 SOCKETS = "FASTDDS_BUILTIN_TRANSPORTS"
 
 
 @pytest.mark.parametrize(
     ("given", "middleware", "expected"),
     [
+        ({}, "rmw_fastrtps_cpp", {_run.RANGE: "SYSTEM_DEFAULT", _run.PROFILE: str(_run.HERE), SOCKETS: None}),
         (
-            {_sockets.RANGE: "LOCALHOST"}, "rmw_fastrtps_cpp",
-            {_sockets.RANGE: "SYSTEM_DEFAULT", _sockets.PROFILE: str(_sockets.FILE), SOCKETS: None},
+            {_run.RANGE: "SUBNET"}, "rmw_fastrtps_cpp",
+            {_run.RANGE: "SUBNET", _run.PROFILE: str(_run.ANYWHERE), SOCKETS: "UDPv4"},
         ),
-        ({_sockets.RANGE: "SUBNET"}, "rmw_fastrtps_cpp", {_sockets.RANGE: "SUBNET", SOCKETS: "UDPv4"}),
-        ({_sockets.RANGE: "LOCALHOST"}, "rmw_cyclonedds_cpp", {_sockets.RANGE: "LOCALHOST", SOCKETS: None}),
+        ({}, "rmw_cyclonedds_cpp", {_run.RANGE: "LOCALHOST", SOCKETS: None}),
         (
-            {_sockets.RANGE: "LOCALHOST", _sockets.USERS[1]: "mine.xml"}, "rmw_fastrtps_cpp",
-            {_sockets.RANGE: "LOCALHOST", _sockets.PROFILE: None},
+            {_run.RANGE: "LOCALHOST", _run.USERS[1]: "mine.xml"}, "rmw_fastrtps_cpp",
+            {_run.RANGE: "LOCALHOST", _run.PROFILE: None},
         ),
         (
-            {_sockets.RANGE: "LOCALHOST", "ROS_DISTRO": "iron"}, "rmw_fastrtps_cpp",
-            {_sockets.RANGE: "LOCALHOST", _sockets.PROFILE: None},
+            {_run.RANGE: "LOCALHOST", "ROS_DISTRO": "iron"}, "rmw_fastrtps_cpp",
+            {_run.RANGE: "LOCALHOST", _run.PROFILE: None},
         ),
     ],
 )  # fmt: skip
-def test_a_node_with_torque_in_hand_publishes_by_sockets_and_stays_on_this_machine(
-    monkeypatch, given, middleware, expected
-):
-    """The range as the profile says it is this machine's, and only Fast DDS reads the profile."""
-    for name in (_sockets.RANGE, SOCKETS, "ROS_DISTRO", *_sockets.USERS):
+def test_a_node_sends_by_sockets_and_stays_on_this_machine(monkeypatch, given, middleware, expected):
+    """Unless the user opens it. The range as the profile says it is this machine; only Fast DDS reads it."""
+    for name in (_run.RANGE, SOCKETS, "ROS_DISTRO", *_run.USERS):
         monkeypatch.setenv(name, given.get(name, ""))
         if name not in given:
             monkeypatch.delenv(name)
-    monkeypatch.setattr(_sockets, "get_rmw_implementation_identifier", lambda: middleware)
-    _sockets.publish_by_sockets()
+    monkeypatch.setattr(_run, "get_rmw_implementation_identifier", lambda: middleware)
+    monkeypatch.setattr(_run.rclpy, "init", lambda **options: None)
+    _run._initialise([])
     assert {name: os.environ.get(name) for name in expected} == expected
-    peers = [e.text for e in XML.parse(_sockets.FILE).iter() if e.tag.endswith("address")]
-    assert peers == ["127.0.0.1"] and "SHM" not in _sockets.FILE.read_text()
+
+
+def test_the_profiles_differ_only_in_who_may_find_a_node():
+    """Nobody is asked for a type: who was asked too soon was never heard (decision 381)."""
+    here, anywhere = (
+        [(e.tag.split("}")[1], (e.text or "").strip()) for e in XML.parse(file).iter()]
+        for file in (_run.HERE, _run.ANYWHERE)
+    )
+    at = anywhere.index(("name", "fastdds.type_propagation"))
+    assert anywhere[at + 1] == ("value", "disabled") and set(anywhere) < set(here)
+    assert [text for tag, text in here if tag == "address"] == ["127.0.0.1"]
+    assert "SHM" not in _run.HERE.read_text()
 
 
 def test_a_node_that_cannot_be_secured_as_requested_does_not_start(tmp_path, monkeypatch):

@@ -38,12 +38,15 @@ def test_ft_and_deflection_come_from_the_encoder_and_are_marked_as_such(wire, li
 def test_the_loss_of_the_encoder_ends_the_torque_until_it_is_back(wire, listener):
     wire.drive()
     wire.bench.ask("set", motor=1, id=50)
-    wire.health.clear()
-    wire.push(lambda: "encoder ID 100" in (wire.value("fault") or ""))
-    assert wire.goal()[0] == 0
-    answer = wire.trigger("clear_fault")
-    assert not answer.success and "encoder ID 100" in answer.message
-    wire.bench.ask("set", motor=1, id=IDENTITY)
+    try:
+        wire.health.clear()
+        wire.push(lambda: "encoder ID 100" in (wire.value("fault") or ""))
+        assert wire.goal()[0] == 0
+        answers = [wire.trigger("clear_fault") for _ in range(3)]  # a busy machine's motor may be silent once
+        assert not any(answer.success for answer in answers)
+        assert any("encoder ID 100" in answer.message for answer in answers)
+    finally:
+        wire.bench.ask("set", motor=1, id=IDENTITY)
     wire.drive()
 
 
