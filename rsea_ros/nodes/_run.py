@@ -1,8 +1,8 @@
 """How a node runs and ends.
 
 Through the shared memory of Fast DDS, `publish` waits a second or two, and keeps the interpreter, for one who
-listens and was stopped (SIGSTOP) while it takes a message out. And Fast DDS 3 asks a publisher for its type, once:
-where the question comes too soon, the node never hears it. So nodes use sockets, and ask for no types (381).
+listens and was stopped (SIGSTOP) while taking a message out. And Fast DDS 3 asks a publisher for its type,
+once: where the question comes too soon, the node never hears it. So nodes use sockets, and ask for no types.
 """
 
 import faulthandler
