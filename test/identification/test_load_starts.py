@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from runs import FREE, free_run
+from runs import FREE, free_run, trying
 
 from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.identification.identify import identify
@@ -20,15 +20,15 @@ def with_gaps(record, gaps, length):
     return replace(record, channels=kept)
 
 
-@pytest.mark.parametrize(("gaps", "length"), [([6.0], 0.0101), ([2.0, 4.5, 7.0, 9.5, 12.0], 0.05)])
+@pytest.mark.parametrize(("gaps", "length"), [([3.0], 0.0101), ([2.0, 4.5], 0.05)])
 def test_rows_that_a_recorder_lost_are_no_misfit_where_the_output_moves(gaps, length):
     """Three lost rows of thousands made ft 230 times its noise, and no value had an interval."""
     true = FREE.with_values({"spring.stiffness": 290.0, "rotor.reflected_inertia": 0.055})
-    record = with_gaps(free_run(true), gaps, length)
+    record = with_gaps(free_run(true).between(0.0, 6.0), gaps, length)
     result = identify([record], FREE)
     assert result.verdict == "adequate"
     assert max(result.times_noise.values()) < 1.15
     for p in result.parameters:
         if p.name in ("spring.stiffness", "rotor.reflected_inertia"):
             assert not p.beside_misfit and p.value == pytest.approx(true[p.name], rel=0.01)
-    assert diagnose([record], FREE).verdict == "nothing_wrong"
+    assert diagnose([record], FREE, settings=trying("backlash")).verdict == "nothing_wrong"
