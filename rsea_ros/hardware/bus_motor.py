@@ -4,6 +4,7 @@ import math
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -16,6 +17,8 @@ T = TypeVar("T")
 ATTEMPTS = 5
 """Of a transaction outside the cycle."""
 BOOT_TIME, BOOT_POLL = 5.0, 0.02
+RETURN = 3.0
+"""s within which a motor that is away at the end may come back, to be switched off."""
 AS_CONFIGURED = "as it was at configure (another one needs cleanup and configure)"
 
 
@@ -70,6 +73,7 @@ class BusMotor(ABC):
     """One motor of some protocol. name: in messages, with its ID and port.
 
     protection: the motor's own watchdog, or a supervisor for a motor without; known once it is open.
+    _owes_zero: whether it has not acknowledged that it is off since it was switched on.
     acknowledged_late: whether the reply to a write that raised NoReply arrived during the last reading.
     """
 
@@ -79,16 +83,24 @@ class BusMotor(ABC):
         self.name = name
         self.protection: Protection | Supervised = Supervised(watchdog, supervisor)
         self._known: Mapping[str, object] | None = None
+        self._owes_zero = False
 
     def open(self) -> None:
         """Open the port, check who answers, switch the torque off, set torque mode, read the limits."""
         self._known = None
         self._set_up()
+        self._owes_zero = False
+
+    def enable(self) -> None:
+        """Switch the torque on, at zero, with a watchdog. Raises DeviceError, also for another motor."""
+        self._owes_zero = True
+        self._switch_on()
 
     def disable(self) -> None:
         """Command zero torque and switch it off."""
         if self._is_set_up():
             self._stop()
+            self._owes_zero = False
 
     def recover(self) -> None:
         """Open the port again if it is lost, and see that it is the same motor, torque off.
@@ -100,10 +112,11 @@ class BusMotor(ABC):
                 raise NoReply(f"{self.name}: it was away when the port was opened again")
             self._answer()
         except DeviceError:
-            self.close()
+            self._let_go()
             self._set_up()
         else:
             self._identify()
+        self._owes_zero = False
         self._supervise()
         if error := self._complaint():
             raise DeviceError(f"motor: hardware error {error}, expected a reboot first")
@@ -121,21 +134,32 @@ class BusMotor(ABC):
             except NoReply:
                 if time.monotonic() > deadline:
                     raise
-        self.close()
+        self._let_go()
         self._set_up()
 
     def close(self) -> None:
-        """Zero torque, off, port closed; where the motor does not acknowledge it, the supervisor stays."""
-        safe = False
+        """Zero torque, off, port closed. Raises DeviceError where torque may be on that nothing else ends.
+
+        A motor without a watchdog that is away is waited for: its supervisor has only the port that was lost.
+        """
+        self._let_go()
+        deadline = time.monotonic() + RETURN
+        while self._owes_zero and isinstance(self.protection, Supervised):
+            if time.monotonic() > deadline:
+                raise DeviceError(f"{self.name}: it has not acknowledged zero torque, cut its power")
+            time.sleep(BOOT_POLL)
+            with suppress(DeviceError):
+                self._set_up()
+            self._let_go()
+
+    def _let_go(self) -> None:
+        """Zero torque, off, port closed; where the motor does not acknowledge it, the supervisor tries."""
         try:
-            if self._is_set_up():
-                self._stop()
-                safe = True
-        except DeviceError:
-            safe = False  # the supervisor's turn
+            with suppress(DeviceError):
+                self.disable()
         finally:
             if isinstance(self.protection, Supervised):
-                self.protection.release(safe=safe)
+                self.protection.release(safe=not self._owes_zero)
             self._end()
 
     def _check_same(self, found: Mapping[str, object]) -> None:
@@ -160,10 +184,6 @@ class BusMotor(ABC):
         """Compare the driver's limits with the motor's own. Raises ParameterError."""
 
     @abstractmethod
-    def enable(self) -> None:
-        """Switch the torque on, at zero, with a watchdog. Raises DeviceError, also for another motor."""
-
-    @abstractmethod
     def read(self, meanwhile: Callable[[], None] | None = None) -> MotorSample:
         """Read all measurements once. Raises NoReply, PortLost. meanwhile: done while the reply is coming."""
 
@@ -186,6 +206,10 @@ class BusMotor(ABC):
     @abstractmethod
     def _identify(self) -> None:
         """Switch the torque off, compare motor and settings with those of `open`, set torque mode."""
+
+    @abstractmethod
+    def _switch_on(self) -> None:
+        """Do the work of `enable`."""
 
     @abstractmethod
     def _is_set_up(self) -> bool:

@@ -16,8 +16,8 @@ SURE = 0.8
 """Share of the time-out from which on the supervisor may have acted."""
 BEATS = 20
 """A time-out; a beat each cycle would wake the supervisor a thousand times a second."""
-ANSWER = 1.0
-"""s that a supervisor may take to answer, or to end."""
+ANSWER, START = 1.0, 5.0
+"""s that a supervisor may take to answer, or to end; to start as a child, on a busy machine."""
 ECHO = 0.5
 """s without an echo after which a supervisor stands still: the driver has no guard."""
 READY = b"ready\n"
@@ -54,15 +54,17 @@ class _End:
                         [sys.executable, "-I", "-S", str(SCRIPT)], start_new_session=True,
                         stdin=far.fileno(), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
                     )  # fmt: skip
+                self._socket.settimeout(START)
             socket.send_fds(self._socket, [json.dumps(order).encode() + b"\n"], [descriptor])
-            answer = self._socket.recv(64) if path else READY  # a child takes its time on a busy machine
+            answer = self._socket.recv(64)  # before it watches nothing may make torque
         except OSError as error:
             answer = str(error).encode()
         if answer != READY:
-            self._socket.close()
+            self.close()
+            where = f"parameter supervisor = {path!r}" if path else "supervisor process"
             raise SupervisorLost(
-                f"parameter supervisor = {path!r}: {answer.decode() or 'no answer'}, expected a supervisor"
-                " that listens there (docs/hardware.md)"
+                f"{where}: {answer.decode() or 'no answer'}, expected a supervisor that listens there"
+                " (docs/hardware.md)"
             )
         self._socket.settimeout(0.0)  # one that stands still is lost, and holds up no cycle
 

@@ -109,7 +109,8 @@ def serve(connection: socket.socket) -> None:
     with connection:
         words, (descriptor, *_), _, _ = socket.recv_fds(connection, 65536, 1)
         order = json.loads(words)
-        connection.sendall(b"ready\n")
+        with contextlib.suppress(OSError):  # a driver that has died meanwhile
+            connection.sendall(b"ready\n")
         try:
             frames, replies = (list(map(bytes.fromhex, order.get(n, []))) for n in ("frames", "replies"))
             line = Line(descriptor, frames, replies)

@@ -2,7 +2,6 @@
 
 import math
 import sys
-import time
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -13,7 +12,7 @@ from msg_adapters import ros
 from msg_adapters.cdr import VALUES, RawWriter
 from msg_adapters.topic_map import FLOATS, JOINT_STATE, TYPES
 from rsea_ros.hardware.device import State
-from rsea_ros.nodes._commands import HORIZON, WATCHDOG, CommandQueue
+from rsea_ros.nodes._commands import HORIZON, WATCHDOG, CommandQueue, Obeyed
 from rsea_ros.nodes._cycle import Anchor, Cycle
 from rsea_ros.nodes._health import OK, WARN, NodeHealth
 from rsea_ros.nodes._mailbox import Mailbox, MessageFields
@@ -22,23 +21,6 @@ from rsea_ros.nodes._qos import COMMAND, MEASURED, MEASUREMENT, OVERRIDES
 
 _AHEAD = "commands ahead"
 """Of who stamps ahead: then late ones are. Who stamps when sending is always late, and means on arrival."""
-
-
-class Obeyed:
-    """ignored: messages of others while the one that is obeyed went on."""
-
-    def __init__(self) -> None:
-        self._who: object = None
-        self._heard = 0
-        self.ignored = 0
-
-    def admit(self, who: object, now: int) -> bool:
-        """Return whether a message of a publisher (by identity) counts. now: ns, of a clock without steps."""
-        if who != self._who and self._who is not None and now - self._heard < HORIZON:
-            self.ignored += 1
-            return False
-        self._who, self._heard = who, now
-        return True
 
 
 class Namesakes:
@@ -146,7 +128,7 @@ class BenchTopics:
         kind = names.get(COMMAND_TYPE.name, JOINT_STATE)
         self._wanted = Mailbox(
             node, f"{within}torque_command", MessageFields(kind, ((COMMANDS[kind], 0),), joint),
-            COMMAND, self.commands.refuse, admit=self._admit if strict else None,
+            COMMAND, self.commands.refuse, admit=self._obeyed.admit if strict else None,
         )  # fmt: skip
 
     def poll(self, anchor: Anchor) -> None:
@@ -212,9 +194,6 @@ class BenchTopics:
             self._node.destroy_publisher(publisher)
         self._node.destroy_subscription(self._wanted.subscription)
         self.namesakes.close()
-
-    def _admit(self, who: object) -> bool:
-        return self._obeyed.admit(who, time.monotonic_ns())
 
 
 def _publisher(node: Node, kind: Any, topic: str) -> Any:

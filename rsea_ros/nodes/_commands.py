@@ -2,6 +2,7 @@
 
 import math
 import threading
+import time
 from typing import NamedTuple
 
 from rsea_ros.nodes._cycle import SECOND
@@ -10,6 +11,24 @@ from rsea_ros.records.record import NONSENSE, is_measured
 MILLISECOND = SECOND // 1000
 HORIZON = 300 * MILLISECOND
 WATCHDOG = 50 * MILLISECOND
+
+
+class Obeyed:
+    """One publisher of torques at a time. ignored: messages of others while that one goes on."""
+
+    def __init__(self) -> None:
+        self._who: object = None
+        self._heard = 0
+        self.ignored = 0
+
+    def admit(self, who: object, now: int | None = None) -> bool:
+        """Return whether a message of a publisher (by identity) counts. now: ns, of a clock without steps."""
+        now = time.monotonic_ns() if now is None else now
+        if who != self._who and self._who is not None and now - self._heard < HORIZON:
+            self.ignored += 1
+            return False
+        self._who, self._heard = who, now
+        return True
 
 
 class PendingCommand(NamedTuple):

@@ -18,7 +18,7 @@ from rsea_ros.control.synthesis import ControllerDesign, DesignLimits
 from rsea_ros.control.uncertainty import lightest, load_range
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.nodes._commands import CommandQueue
+from rsea_ros.nodes._commands import CommandQueue, Obeyed
 from rsea_ros.nodes._cycle import Anchor
 from rsea_ros.nodes._mailbox import Mailbox, MessageFields
 from rsea_ros.nodes._qos import COMMAND, MEASUREMENT
@@ -135,7 +135,10 @@ class Measurements:
         angle = MessageFields(JOINT_STATE, (("position", 0),), joint)
         self._deflections = encoder and Mailbox(node, "deflection", angle, MEASUREMENT, lambda: None)
         torque = MessageFields(JOINT_STATE, (("effort", 0),), joint)
-        self._desired = Mailbox(node, "desired_torque", torque, COMMAND, self.desired.refuse)
+        self.obeyed = Obeyed()
+        self._desired = Mailbox(
+            node, "desired_torque", torque, COMMAND, self.desired.refuse, admit=self.obeyed.admit
+        )
         self.subscriptions = [self._states.subscription, self._fts.subscription]
 
     def take(self) -> Iterator[tuple[int, Measurement]]:

@@ -65,7 +65,7 @@ class ControllerNode(Program):
         self._fault, self._told_fault, self._release = "", "", (0, 0.0)
         self._wished = self._held = False
         self._steps = self._missed = self._limited = self._late = self._late_reported = self._restarts = 0
-        self._told_losses = 0
+        self._told_losses = self._ignored_reported = 0
         self._squares: list[float] = []
         self._commands = node.create_publisher(JointState, "torque_command", COMMAND)
         template = serialize_message(torque_command_message(0, 0.0, values["joint"]))
@@ -273,8 +273,13 @@ class ControllerNode(Program):
             "delay_margin_samples": f"{worst.delay:.2f}",
             "desired_watchdog_trips": self._desired.expired,
             "refused_desired": self._desired.refused,
+            "ignored_desired": self._inputs.obeyed.ignored,
         }
         warnings = [*filter(None, [self._limits.contradiction]), *self._loss_words()]
+        ignored = self._inputs.obeyed.ignored
+        new, self._ignored_reported = ignored - self._ignored_reported, ignored
+        if new:
+            warnings.append(f"{new} desired torques of a second publisher ignored")
         new, self._late_reported = self._late - self._late_reported, self._late
         if new:
             warnings.insert(0, f"{new} commands more than a sample late, with less feedback")

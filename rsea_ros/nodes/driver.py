@@ -133,6 +133,9 @@ class DriverNode(ManagedEntity, Program):
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Switch the torque on and let commands through, from the next one on; not with a fault latched."""
+        if self._cycle is None:
+            self._node.get_logger().error("not activated: closed while a motor was away, clean up again")
+            return TransitionCallbackReturn.FAILURE
         try:
             for joint in self.joints:
                 joint.enable(zero_first=self._zero_first)
@@ -148,8 +151,12 @@ class DriverNode(ManagedEntity, Program):
         return TransitionCallbackReturn.SUCCESS
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Command zero torque, close the device, take the topics away."""
-        self.close()
+        """Command zero torque, close the device, take the topics away; again where a motor was away."""
+        try:
+            self.close()
+        except DeviceError as error:
+            self._node.get_logger().fatal(f"{error}")
+            return TransitionCallbackReturn.FAILURE
         return TransitionCallbackReturn.SUCCESS
 
     on_shutdown = on_error = on_cleanup
@@ -173,19 +180,20 @@ class DriverNode(ManagedEntity, Program):
         return False
 
     def close(self) -> None:
-        """Zero torque, devices closed, topics removed; also without any."""
+        """Zero torque, devices closed, topics removed; also without any. Raises DeviceError of a motor."""
         for joint in self.joints:
             joint.guarded.interlock.disable()
         self._jobs.join(PATIENCE)
-        try:
+        was_open = self._cycle is not None
+        with ExitStack() as kept:  # each whatever the one before raises
+            kept.callback(self._take_topics_away)
+            if self._cycle is not None:
+                kept.callback(stop_keeping_time, self._values)
+            kept.callback(self._close_devices)
             if self._cycle is not None:
                 self._cycle.stop()
-        finally:
-            self._close_devices()
-        if self._cycle is not None:
-            stop_keeping_time(self._values)
+        if was_open:
             self._node.get_logger().info("torque zero, device closed")
-        self._take_topics_away()
 
     def _take_topics_away(self) -> None:
         for joint in self.joints:

@@ -16,7 +16,7 @@ import pytest
 import yaml
 
 from rsea_ros.errors import DeviceError, ParameterError
-from rsea_ros.hardware import supervisor
+from rsea_ros.hardware import protection, supervisor
 from rsea_ros.hardware.device import Spring
 from rsea_ros.hardware.guarded import GuardedDevice
 from rsea_ros.hardware.limits import Limits
@@ -212,6 +212,31 @@ def test_it_repeats_its_frames_until_the_motor_has_acknowledged_them(ignored):
     assert process.wait(10.0) == 0
     motor.close()
     assert set(heard) == set(FRAMES) and len(heard) > ignored, "and then it has ended, without a signal"
+
+
+def test_a_driver_that_died_before_it_was_ready_has_a_supervisor_all_the_same():
+    """It ended at a broken pipe, and the torque stayed on."""
+    motor, port = socket.socketpair()
+    driver, far = socket.socketpair()
+    order = {"timeout": 0.1, "frames": [b"zero".hex()]}
+    socket.send_fds(driver, [json.dumps(order).encode()], [port.fileno()])
+    driver.close()
+    supervisor.serve(far)
+    port.close()
+    assert motor.recv(4) == b"zero"
+    motor.close()
+
+
+def test_a_child_that_does_not_watch_yet_is_waited_for(monkeypatch, tmp_path):
+    """After `clear_fault` a driver had torque 40 ms before its new supervisor had begun."""
+    monkeypatch.setattr(protection, "START", 0.2)
+    monkeypatch.setattr(protection, "SCRIPT", tmp_path / "slow.py")
+    (tmp_path / "slow.py").write_text("import time\ntime.sleep(60.0)\n")
+    motor, port = socket.socketpair()
+    with pytest.raises(protection.SupervisorLost, match="supervisor process: timed out, expected"):
+        protection.Supervisor(port.fileno(), 0.1, [b"zero"])
+    motor.close()
+    port.close()
 
 
 @pytest.fixture

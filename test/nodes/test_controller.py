@@ -6,9 +6,10 @@ import time
 import numpy as np
 import pytest
 
-from msg_adapters.ros import stamp_of
+from msg_adapters.ros import JointState, stamp_of, torque_command_message
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig, save_rig
+from rsea_ros.nodes._qos import COMMAND
 from test.nodes.torque_loop import GAINS, PERIOD, RATE, Loop
 
 HZ, AMPLITUDE = 5.0, 10.0
@@ -77,6 +78,22 @@ def test_a_desired_torque_that_ceases_and_comes_back_is_no_step(loop, listener):
     listener.until(lambda: abs(loop.wrenches[-1].wrench.torque.z) < 0.5)
     loop.hold(10.0, lambda: abs(loop.wrenches[-1].wrench.torque.z - 10.0) < 0.5)
     assert max(abs(m.effort[0]) for m in loop.commands if stamp_of(m.header.stamp) > since) < 20.0
+
+
+def test_a_second_publisher_of_the_desired_torque_is_counted_and_not_obeyed(loop, listener):
+    """10 beside -10 N m were 48 to 68 N m at the motor, without a word."""
+    loop.hold(10.0, lambda: all(abs(m.wrench.torque.z - 10.0) < 0.5 for m in loop.wrenches[-60:]))
+    other, since = listener.node.create_publisher(JointState, "/rsea/desired_torque", COMMAND), time.time_ns()
+
+    def is_told():
+        other.publish(torque_command_message(time.time_ns(), -10.0))
+        values = loop.values()
+        return "torques of a second publisher ignored" in values[""] and int(values["ignored_desired"]) > 50
+
+    loop.hold(10.0, is_told)
+    listener.node.destroy_publisher(other)
+    beside = [m.effort[0] for m in loop.commands if stamp_of(m.header.stamp) > since]
+    assert len(beside) > 100 and min(beside) > 0.0 and max(beside) < 20.0
 
 
 def test_without_measurements_the_torque_ends_until_the_fault_is_cleared(loop, start, model, listener):

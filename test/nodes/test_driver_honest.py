@@ -13,7 +13,7 @@ import pytest
 from rclpy.executors import SingleThreadedExecutor
 
 from msg_adapters.ros import JointState, torque_command_message
-from rsea_ros.nodes._bench_topics import Obeyed
+from rsea_ros.nodes._commands import Obeyed
 from rsea_ros.nodes._qos import COMMAND
 from rsea_ros.nodes._run import SignalListener
 from rsea_ros.nodes._waiter import Pulse, anything_to_do

@@ -143,6 +143,19 @@ def test_after_deactivation_the_torque_is_zero_and_off(wire, listener):
     assert wire.change(Transition.TRANSITION_ACTIVATE).success
 
 
+def test_a_motor_that_is_away_at_cleanup_is_switched_off_when_it_is_back(wire):
+    """Its 10 N m went on for good, and the driver said: torque zero, device closed."""
+    wire.drive()
+    wire.bench.ask("vanish")
+    assert wire.change(Transition.TRANSITION_DEACTIVATE).success
+    assert not wire.change(Transition.TRANSITION_CLEANUP).success
+    assert not wire.change(Transition.TRANSITION_ACTIVATE).success and wire.goal()[1]
+    wire.bench.ask("appear")
+    assert wire.change(Transition.TRANSITION_CLEANUP).success and wire.goal() == (0, False)
+    assert wire.change(Transition.TRANSITION_CONFIGURE).success
+    assert wire.change(Transition.TRANSITION_ACTIVATE).success
+
+
 def test_after_sigint_the_torque_is_zero_and_off(wire):
     wire.drive()
     assert wire.process.stop(signal.SIGINT) == 0

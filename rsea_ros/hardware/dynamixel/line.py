@@ -193,7 +193,7 @@ class LineMotor(Motor):
 
     def _set_up(self) -> None:
         """Join the line and be set up, torque off. Raises DeviceError, also for a motor of another series."""
-        self._line.join(self._id, self.close)
+        self._line.join(self._id, self._let_go)
         super()._set_up()
         self._line.admit(self._id, self.control_table, self.bus.return_delay)
 
@@ -226,7 +226,7 @@ class LineMotor(Motor):
             pass  # a fault of this motor alone is handled below
         super().recover()
 
-    def close(self) -> None:
+    def _let_go(self) -> None:
         """Zero torque, off; the last motor of the line closes the port."""
-        super().close()
+        super()._let_go()
         self._line.leave(self._id)

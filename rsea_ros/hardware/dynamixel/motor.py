@@ -123,8 +123,7 @@ class Motor(BusMotor):
         """Whether the motor has a watchdog of its own."""
         return not isinstance(self.protection, Supervised)
 
-    def enable(self) -> None:
-        """Switch the torque on, at zero, with a watchdog. Raises DeviceError, also for another motor."""
+    def _switch_on(self) -> None:
         table = self.control_table
         self._identify()
         kept = [("torque_enable", table.torque_enable, 1)]

@@ -88,8 +88,7 @@ class MitMotor(BusMotor):
         self._counts.restart()
         super().open()
 
-    def enable(self) -> None:
-        """Switch the torque on, at zero, with a watchdog. Raises DeviceError, also for another drive."""
+    def _switch_on(self) -> None:
         self._identify()
         if self._watched:
             self._set("watchdog", max(1, round(self._settings.watchdog / self.table.watchdog_unit)))
