@@ -110,7 +110,7 @@ class BusMotor(ABC):
         try:
             if not self._is_set_up():
                 raise NoReply(f"{self.name}: it was away when the port was opened again")
-            self._answer()
+            self.patiently(self._ping)
         except DeviceError:
             self._let_go()
             self._set_up()
@@ -218,10 +218,6 @@ class BusMotor(ABC):
     @abstractmethod
     def _stop(self) -> None:
         """Command zero torque and switch it off. Raises DeviceError unless the motor acknowledges it."""
-
-    @abstractmethod
-    def _answer(self) -> None:
-        """Raise DeviceError where the motor does not answer, after several attempts."""
 
     @abstractmethod
     def _ping(self) -> None:

@@ -220,9 +220,6 @@ class Motor(BusMotor):
     def _ping(self) -> None:
         self.bus.ping()
 
-    def _answer(self) -> None:
-        self.bus.patiently(self.bus.ping)
-
     def _complaint(self) -> str:
         error = self.bus.patiently(lambda: self.bus.get(self.control_table.hardware_error))
         return error_names(error) if error else ""

@@ -233,9 +233,6 @@ class MitMotor(BusMotor):
     def _ping(self) -> None:
         self.read()
 
-    def _answer(self) -> None:
-        self.patiently(self.read)
-
     def _complaint(self) -> str:
         return self.patiently(self.read).hardware_error
 
