@@ -24,7 +24,6 @@ if platform.machine() == "x86_64":  # stored numbers are one kernel's: fits far 
 
 import rsea_ros.cli  # noqa: F401  first of all: it keeps numpy from starting threads of its own
 from rsea_ros.compiler import trusted_cache
-from rsea_ros.identification.solver import on_cores
 
 gc.disable()  # until all is collected: it finds nothing in what tests are made of, in a second of each worker
 
@@ -54,6 +53,8 @@ FIRST = "gw0"
 """The worker that keeps its priority, and gets the files that wait: the others make way for it."""
 
 if (worker := os.environ.get("PYTEST_XDIST_WORKER")) is not None:
+    from rsea_ros.identification.solver import on_cores  # 0.5 s; their controller needs none
+
     on_cores(1).__enter__()  # there is a worker for each core: threads that wait for each other cost a fifth
     os.nice(0 if worker == FIRST else 10)
 
