@@ -9,10 +9,11 @@ import faulthandler
 import math
 import os
 import signal
+import stat
 import sys
 import threading
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -141,6 +142,8 @@ def run_nodes(components: Sequence[Component], arguments: Sequence[str] = ()) ->
         return SUCCESS
     stop, log = _Stop(), get_logger(components[0].name)
     patience, listener = max(each.patience for each in components), None
+    if endless := all(each.endless for each in components):
+        _wait_for_no_reader()
     try:
         if math.isfinite(patience):
             listener = SignalListener(partial(faulthandler.dump_traceback_later, patience, exit=True))
@@ -148,7 +151,6 @@ def run_nodes(components: Sequence[Component], arguments: Sequence[str] = ()) ->
         if effects := os.environ.get("RSEA_EFFECTS"):
             log.warning(f"RSEA_EFFECTS={printable(effects)}: code from there runs in this node")
         done = _work(sorted(components, key=lambda each: each.kind is Node), stop)  # drivers are first
-        endless = all(each.endless for each in components)
         return SUCCESS if done or (endless and stop.status - Stopped.BASE in STOPPING) else stop.status
     except Stopped as stopped:
         return stopped.status
@@ -160,6 +162,14 @@ def run_nodes(components: Sequence[Component], arguments: Sequence[str] = ()) ->
         if listener is not None:
             listener.close()
             faulthandler.cancel_dump_traceback_later()
+
+
+def _wait_for_no_reader() -> None:
+    """Lose what a full pipe does not take: who reads no more would stop the cycle, and each answer."""
+    for stream in (1, 2):
+        with suppress(OSError):
+            if not stat.S_ISCHR(mode := os.fstat(stream).st_mode) and not stat.S_ISREG(mode):
+                os.set_blocking(stream, False)
 
 
 class SignalListener:

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import warnings
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -16,6 +17,7 @@ from std_msgs.msg import Empty
 from bench.processes import may_have
 from rsea_ros.nodes._policies import NODES
 from rsea_ros.nodes._waiter import Pulse, anything_to_do
+from test.nodes.conftest import Process
 
 
 @pytest.mark.parametrize(("name", "module"), NODES.items())
@@ -26,6 +28,22 @@ def test_a_node_is_a_program(name, module, monkeypatch, capsys):
         runpy.run_module(module, run_name="__main__")
     assert left.value.code == 0
     assert capsys.readouterr().out.startswith(f"usage: ros2 run rsea_ros {name} ")
+
+
+def test_a_driver_whose_output_nobody_reads_answers(listener, tmp_path):
+    """Its first log line into a full pipe was its last; a stop was never answered."""
+    os.mkfifo(log := tmp_path / "log")
+    reader = os.open(log, os.O_RDONLY | os.O_NONBLOCK)
+    process = Process("driver", log, {"device": "simulated", "autostart": True}, {"__ns": "/mute"})
+    writer = os.open(log, os.O_WRONLY | os.O_NONBLOCK)
+    with suppress(BlockingIOError):
+        while True:
+            os.write(writer, b"full")
+    for service in ("stop", "clear_fault"):
+        assert listener.call(f"/mute/driver/{service}").success
+    assert process.stop(signal.SIGTERM) == 0
+    os.close(reader)
+    os.close(writer)
 
 
 ROOT = Path(__file__).resolve().parents[2]
