@@ -20,6 +20,7 @@ import tempfile
 import time
 import traceback
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from types import FrameType
 
@@ -124,9 +125,11 @@ def serve(folder: Path) -> None:
 
     def reap(number: int, frame: FrameType | None) -> None:
         for pid in sorted(running):
-            if os.waitid(os.P_PID, pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is not None:
-                _, status = os.waitpid(pid, 0)
-                running.remove(pid)
+            with suppress(ChildProcessError):  # one call interrupts another, and has reaped it
+                ended, status = os.waitpid(pid, os.WNOHANG)
+                if not ended:
+                    continue
+                running.discard(pid)
                 (folder / f"{pid}.new").write_text(str(os.waitstatus_to_exitcode(status)))
                 (folder / f"{pid}.new").rename(folder / str(pid))
 
