@@ -46,9 +46,9 @@ ANYWHERE = HERE.with_name("sockets.xml")
 
 
 def use_sockets() -> None:
-    """From the next participant on. Found by this machine unless the user opens it: who finds may command.
+    """Let nodes from now on send by sockets, and be found from this machine alone unless the user opens it.
 
-    A profile of Fast DDS that the user has, and other middleware, are left alone.
+    Who finds a node may command torque. A user's own profile of Fast DDS, and other middleware, stay.
     """
     os.environ.setdefault(RANGE, LOCALHOST)
     if any(name in os.environ for name in USERS) or os.environ.get("ROS_DISTRO") in OLDER:
@@ -165,7 +165,7 @@ def run_nodes(components: Sequence[Component], arguments: Sequence[str] = ()) ->
 
 
 def _wait_for_no_reader() -> None:
-    """Lose what a full pipe does not take: who reads no more would stop the cycle, and each answer."""
+    """Drop what a full pipe does not take: a reader that has stopped would hold up cycle and answers."""
     for stream in (1, 2):
         with suppress(OSError):
             if not stat.S_ISCHR(mode := os.fstat(stream).st_mode) and not stat.S_ISREG(mode):

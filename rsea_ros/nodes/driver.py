@@ -151,7 +151,7 @@ class DriverNode(ManagedEntity, Program):
         return TransitionCallbackReturn.SUCCESS
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Command zero torque, close the device, take the topics away; again where a motor was away."""
+        """Command zero torque, close the device, take the topics away. Fails while a motor is away."""
         try:
             self.close()
         except DeviceError as error:
@@ -180,7 +180,7 @@ class DriverNode(ManagedEntity, Program):
         return False
 
     def close(self) -> None:
-        """Zero torque, devices closed, topics removed; also without any. Raises DeviceError of a motor."""
+        """Zero torque, devices closed, topics removed; also without any. Raises DeviceError: a motor away."""
         for joint in self.joints:
             joint.guarded.interlock.disable()
         self._jobs.join(PATIENCE)
