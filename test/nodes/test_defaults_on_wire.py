@@ -11,6 +11,7 @@ import threading
 import time
 
 import pytest
+from lifecycle_msgs.msg import Transition
 
 from test.nodes.on_wire import Driven
 from test.nodes.stalls import is_stall
@@ -64,8 +65,14 @@ class Commanded(Driven):
         self.children = tuple(int(pid) for pid in found.stdout.split())
 
     def clear(self):
-        """Clear the fault, by a reboot where that is necessary; return the answers."""
+        """Clear the fault, by a reboot or from the start where that is necessary; return the answers.
+
+        From the start: the bench's position jumped while a stall let no cycle see it, and jumped back.
+        """
         answers = [self.trigger("clear_fault")]
+        if not answers[0].success and "expected cleanup and configure" in answers[0].message:
+            for transition in (Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_CLEANUP):
+                self.change(transition)
         if not answers[0].success and "expected a reboot" in answers[0].message:
             answers.append(self.trigger("reboot"))
         self.health.clear()
@@ -157,7 +164,8 @@ def test_a_fault_ends_the_torque_within_its_cycles_and_is_over_by_its_service(wi
         end(wire)
         if fault.startswith(cause):
             break
-        assert is_stall(fault) or fault.startswith("command_timeout"), fault
+        seen_first = "off: ft" in fault  # by spring and motor: ft stood still before its torque was there
+        assert is_stall(fault) or seen_first or fault.startswith("command_timeout"), fault
     assert fault.startswith(cause)
     acted = max((at for at, acts in enumerate(writes, 1) if acts), default=0)
     assert most is None or acted <= most, writes

@@ -178,9 +178,13 @@ def test_each_joint_follows_its_commands_in_one_exchange_a_cycle(leg):
 
 
 def test_a_fault_of_one_joint_ends_by_its_own_service(leg):
-    leg.ready()
-    leg.bench.ask("set", motor=1, temperature=90)
-    leg.until(lambda: leg.faults()[1].startswith("temperature"))
+    for _ in range(4):
+        leg.ready()
+        leg.bench.ask("set", motor=1, temperature=90)
+        leg.listener.until(lambda: leg.faults()[1] not in ("none", "unknown"))
+        if leg.faults()[1].startswith("temperature"):
+            break
+        leg.bench.ask("set", motor=1, temperature=30)  # a stall was first: nothing clears it in heat
     refused = leg.call("knee/clear_fault")
     assert not refused.success and "is still there" in refused.message
     leg.bench.ask("set", motor=1, temperature=30)
