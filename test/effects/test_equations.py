@@ -52,6 +52,19 @@ def test_the_simulation_obeys_the_equation_of_every_effect(effect):
             assert error < 0.005 * rms(true[name] - nominal[name]), (name, error)
 
 
+@pytest.mark.parametrize("effect", [e for e in ON_THE_BENCH if e.response], ids=lambda e: e.name)
+def test_a_linear_effect_has_the_response_of_its_simulation(effect):
+    """At 9 Hz, over three seconds after the start has died away; motors are heard in ft as sensors are."""
+    t = np.arange(280 * 6) / 280.0
+    driven, late = drive_from(record_of(Channel(t, 10.0 * np.sin(18.0 * math.pi * t)))), slice(840, None)
+    with_it, without = (
+        np.exp(-18j * math.pi * t[late]) @ simulate(driven, *chosen)["ft"][late]
+        for chosen in ((effect.name, effect.typical), ())
+    )
+    response = effect.response(effect.vector(effect.typical), 18j * math.pi)
+    assert with_it / without == pytest.approx(response, rel=5e-3)
+
+
 MASS, DAMPING, HEAVY = 0.5, 0.4, 6.0
 
 

@@ -56,6 +56,11 @@ class Driven:
         """The newest value that the driver's diagnostics have."""
         return value_in(self._newest(), key)
 
+    def latched(self):
+        """The fault that was published last, once there is one."""
+        fault = self.value("fault")
+        return None if fault in (None, "none") else fault
+
     def _newest(self):
         return newest_status(self.health, f"/{self.name}/driver")
 

@@ -42,11 +42,6 @@ class Commanded(Driven):
         self._over.set()
         self._thread.join()
 
-    def latched(self):
-        """The fault that was published last, once there is one."""
-        fault = self.value("fault")
-        return None if fault in (None, "none") else fault
-
     def ready(self):
         """Wait until the motor has all of its torque and no fault is latched; find the driver's processes.
 

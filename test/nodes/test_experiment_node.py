@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from msg_adapters import write_record
-from msg_adapters.ros import DiagnosticArray, JointState, stamp_of
+from msg_adapters.ros import DiagnosticArray, JointState, Trigger, stamp_of
 from rsea_ros.experiment.run_shape import Shape, command_of, run_text
 from rsea_ros.model.rig_file import load_rig, save_rig
 from rsea_ros.model.simulation import synthesize
@@ -105,7 +105,7 @@ def approved(session, ask, listener):
 
             def again(asked=asked):  # a node that hears its bench late lets the approval expire
                 if "approval has expired" in "".join(asked.node.output[-1:]):
-                    ask("approve")
+                    listener.clients["/rsea/experiment/approve"].call_async(Trigger.Request())
 
             listener.until(lambda asked=asked: condition(asked) or not asked.node.is_running(), mend=again)
             if asked.node.is_running() or not any(stall in told(asked.out)["why"] for stall in STALLS):
