@@ -98,7 +98,8 @@ def tests_of(target: str, where: str) -> tuple[list[str], list[str]]:
     """Return the tests that may notice a fault in a function, the nearest first; those that wait apart.
 
     Those that call it; for what is outside a function, compiled, or called by none, all that import its
-    module, call anything of it or stand in its folder, then those that call anything of its importers.
+    module, call anything of it or stand in its folder, then those that call anything of its importers; at
+    last test/golden, which says what every verb and table says.
     """
     known = calls()
     name = where.rpartition(".")[2]
@@ -110,9 +111,10 @@ def tests_of(target: str, where: str) -> tuple[list[str], list[str]]:
     ordered: list[str] = []
     for group in groups:
         ordered += sorted(set(group) - set(ordered), key=lambda u: _distance(target, u))
-    return _within_limit([u for u in ordered if not u.startswith(WAIT)]), [
-        u for u in ordered if u.startswith(WAIT)
-    ][:WIRES]
+    waiting = [u for u in ordered if u.startswith(WAIT)][:WIRES]
+    near = _within_limit([u for u in ordered if not u.startswith(WAIT)])
+    said = () if found else (u for u in known.seconds if u.startswith("test/golden/"))
+    return list(dict.fromkeys([*near, *said])), waiting
 
 
 def seconds_of(tests: Iterable[str]) -> float:
