@@ -141,6 +141,9 @@ def test_no_bag_is_written_where_the_second_of_two_files_is_bad(tmp_path, refuse
     (tmp_path / "b.csv").write_text("x\n1\n3\n")
     assert main(words) == 0
     assert sorted(path.name for path in out.iterdir()) == ["a", "b"]
+    (tmp_path / "a.txt").write_text("x\n1\n2\n")
+    twice = refused(*words[:2], str(tmp_path / "a.txt"), *words[2:-1], str(tmp_path / "others"))
+    assert "a: is the bag of two inputs, expected other file names" in twice
 
 
 def test_the_shipped_map_scales_each_joint_of_a_normalised_data_set(episodes):

@@ -24,7 +24,15 @@ from rsea_ros.control.margins import impedance, largest_pole, margins, returns
 from rsea_ros.control.robustness import NEAR, robustness, softness, spread
 from rsea_ros.control.study import EFFECTS, hard, lagging_corners, sine, tracking_error
 from rsea_ros.control.synthesis import check, design, grid
-from rsea_ros.control.uncertainty import LOCKED, Uncertainty, assumed, load_range, load_uncertainty, mode_of
+from rsea_ros.control.uncertainty import (
+    LOCKED,
+    Uncertainty,
+    assumed,
+    dense,
+    load_range,
+    load_uncertainty,
+    mode_of,
+)
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
@@ -228,6 +236,8 @@ def test_a_file_states_what_it_knows_and_leaves_the_rest(tmp_path):
     stated = load_uncertainty(path, RIG, RATE)
     assert stated == Uncertainty(0.05, 0.5, 0.0, 2, 2e-3, (33.0, 0.02, 0.3))
     assert "33 Hz" in str(stated) and "2 samples late" in str(stated)
+    modes = {case.mode for case in dense([LOCKED], stated)}
+    assert modes == {None, (33.0, 0.02, 0.15), (33.0, 0.02, 0.3)}
 
 
 @pytest.mark.parametrize(("text", "told"), [

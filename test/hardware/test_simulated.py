@@ -1,11 +1,14 @@
 """The simulated device against whole-record simulation: its time is the clock's, not the caller's."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from rsea_ros.errors import DeviceError
 from rsea_ros.hardware.simulated import SECOND, SimulatedDevice
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.sensor_filter import SensorFilter
 from rsea_ros.model.simulation import simulate
 from rsea_ros.records.record import Channel, Record
 
@@ -54,8 +57,10 @@ def _expectation(rig, commands, offset):
 
 
 @pytest.mark.parametrize("offset", [0.0, 0.37])
-def test_a_command_acts_from_its_instant_on(offset):
+@pytest.mark.parametrize("known", [None, SensorFilter("alpha_beta", (0.5, 0.1))])
+def test_a_command_acts_from_its_instant_on(offset, known):
     rig = load_rig("paper_high_impedance")
+    rig = replace(rig, sensors={**rig.sensors, "ft": replace(rig.sensors["ft"], filter=known)})
     commands = np.random.default_rng(1).normal(0.0, 20.0, 600)
     states = _run(*_device(rig), commands, offset)
     expected = _expectation(rig, commands, offset)

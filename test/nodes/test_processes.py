@@ -15,6 +15,7 @@ from rclpy.executors import SingleThreadedExecutor
 from std_msgs.msg import Empty
 
 from bench.processes import may_have
+from rsea_ros import processes
 from rsea_ros.nodes._policies import NODES
 from rsea_ros.nodes._waiter import Pulse, anything_to_do
 from test.nodes.conftest import Process
@@ -28,6 +29,13 @@ def test_a_node_is_a_program(name, module, monkeypatch, capsys):
         runpy.run_module(module, run_name="__main__")
     assert left.value.code == 0
     assert capsys.readouterr().out.startswith(f"usage: ros2 run rsea_ros {name} ")
+
+
+def test_a_started_program_does_not_hear_the_terminals_ctrl_c():
+    begun = processes.start(["sleep", "60"])
+    assert os.getsid(begun.pid) == begun.pid
+    processes.stop([begun])
+    assert begun.returncode == -signal.SIGTERM
 
 
 def test_a_driver_whose_output_nobody_reads_answers(listener, tmp_path):
