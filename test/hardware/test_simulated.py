@@ -57,7 +57,7 @@ def _expectation(rig, commands, offset):
 
 
 @pytest.mark.parametrize("offset", [0.0, 0.37])
-@pytest.mark.parametrize("known", [None, SensorFilter("alpha_beta", (0.5, 0.1))])
+@pytest.mark.parametrize("known", [None, SensorFilter("kalman", (2000.0,))])
 def test_a_command_acts_from_its_instant_on(offset, known):
     rig = load_rig("paper_high_impedance")
     rig = replace(rig, sensors={**rig.sensors, "ft": replace(rig.sensors["ft"], filter=known)})
