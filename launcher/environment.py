@@ -19,7 +19,7 @@ from pathlib import Path
 
 NETWORK_SIGNS = ("connection broken", "Max retries exceeded", "name resolution", "timed out")
 PIP_INSTALL = (
-    "-m", "pip", "install", "--no-input", "--progress-bar=off", "--retries=2", "--disable-pip-version-check",
+    "-Im", "pip", "install", "--no-input", "--progress-bar=off", "--retries=2", "--disable-pip-version-check",
     "--no-deps", "--require-hashes", "--only-binary=:all:",
 )  # fmt: skip
 BEGUN = "Installing collected packages"
@@ -104,9 +104,10 @@ def make(root: Path, ros: str, key: str, lock: int) -> None:
     """Make the environment from nothing and stamp it."""
     venv = owned(root)
     (venv / "complete").unlink(missing_ok=True)
-    say(f"making .venv with Python {platform.python_version()}, this once: about two minutes, about 0.8 GB")
+    size = "0.8 GB" if ros == "wheels" else "0.6 GB"
+    say(f"making .venv with Python {platform.python_version()}, this once: about two minutes, about {size}")
     site = ["--system-site-packages"] if ros == "sourced" else []
-    run([sys.executable, "-m", "venv", "--clear", *site, str(venv)], root / ".venv.log", lock)
+    run([sys.executable, "-Im", "venv", "--clear", *site, str(venv)], root / ".venv.log", lock)
     names = ["run"]
     if ros == "sourced":
         say(f"rclpy is that of the sourced ROS 2 {os.environ.get('ROS_DISTRO', '')}; installing the rest")

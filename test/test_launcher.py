@@ -205,11 +205,12 @@ def test_an_environment_behind_a_link_is_never_cleared(clone, quick, tmp_path):
     assert (elsewhere / "kept").exists()
 
 
-def test_without_network_it_says_so(clone, quick, silent_server):
+def test_without_network_it_says_so_beside_any_modules_of_the_user(clone, quick, silent_server, tmp_path):
     address = silent_server.getsockname()
     silent_server.close()
     ask_for(clone, address)
-    status, out, err = run(clone, quick)
+    (tmp_path / "platform.py").touch()
+    status, out, err = run(clone, quick, PYTHONPATH=str(tmp_path))
     assert (status, out) == (2, "")
     assert err.splitlines()[-1].startswith("rsea: no network: the package index does not answer")
 
@@ -270,7 +271,7 @@ def test_a_verb_adds_what_it_needs_once(clone, quick, tmp_path, silent_server):
         lock(clone, name).write_text(pinned(place, pin))
     assert run(clone, quick, "demo", PIP_INDEX_URL=address)[:2] == (0, "ran demo\n")
     assert installed(clone) == {"base 1.0"}
-    assert run(clone, quick, "fleet", "--help") == (0, "ran fleet --help\n", "")
+    assert run(clone, quick, "export", "--help") == (0, "ran export --help\n", "")
 
     begun, wheels = lock(clone, "fleet").read_text(), silent_server
     ask_for(clone, wheels.getsockname(), "fleet")
@@ -283,8 +284,8 @@ def test_a_verb_adds_what_it_needs_once(clone, quick, tmp_path, silent_server):
     status, out, err = run(clone, quick, "demo", PIP_INDEX_URL=address)
     assert (status, out) == (0, "ran demo\n") and "making .venv" in err, "a killed part was used"
 
-    status, out, err = run(clone, quick, "fleet", "run", PIP_INDEX_URL=address)
-    assert (status, out) == (0, "ran fleet run\n")
+    status, out, err = run(clone, quick, "fleet", "--help", PIP_INDEX_URL=address)
+    assert (status, out) == (0, "ran fleet --help\n"), "help of fleet imports its packages"
     assert err.splitlines() == [f"rsea: adding fleet to .venv, this once: {environment().PARTS['fleet']}"]
     assert run(clone, quick, "fleet", "run") == (0, "ran fleet run\n", "")
     assert installed(clone) == {"base 1.0", "pool 1.0"}
