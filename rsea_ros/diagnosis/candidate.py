@@ -14,6 +14,7 @@ from rsea_ros.effects.signal_table import sensor_of
 from rsea_ros.identification.fit import with_noise_of
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Map, Solution, serial, solve
+from rsea_ros.identification.start import settled_starts
 from rsea_ros.identification.unknowns import LOOP_CLOCK, Unknown
 from rsea_ros.model.drive import Drive, coarser, finer
 from rsea_ros.records.record import FloatArray
@@ -266,6 +267,15 @@ def on_fine_steps(model: Candidate, setup: FitSetup) -> Candidate:
         cases, outputs = halved, finer_outputs
     cases, outputs = best
     return model if cases is model.cases else refit(rescore(replace(model, outputs=outputs), cases), setup)
+
+
+def where_it_begins(model: Candidate, setup: FitSetup) -> Candidate:
+    """Return a candidate whose drives begin anew, behind gaps, where it has them; itself without gaps."""
+    whole = replace(model.problem, cases=model.cases)
+    settled, theta = settled_starts(whole, model.solution.theta, setup.run)
+    if settled is whole:
+        return model
+    return refit(rescore(replace(model, outputs=settled.outputs(theta)), settled.cases), setup)
 
 
 _HALVINGS, _FALLS = 2, 0.5

@@ -26,7 +26,7 @@ from rsea_ros.identification.fit import as_recorded, unknowns_of, with_even_cloc
 from rsea_ros.identification.identify import lost_behind
 from rsea_ros.identification.problem import Problem, case_from
 from rsea_ros.identification.result import Remark
-from rsea_ros.identification.solver import Pools, worker_pools
+from rsea_ros.identification.solver import Map, Pools, serial, worker_pools
 from rsea_ros.identification.start import joint_start, scale_of, settled_starts
 from rsea_ros.identification.unknowns import start_vector
 from rsea_ros.model.extent import bound_values
@@ -63,12 +63,12 @@ def diagnose(
         check_diagnosable(record)
     rig, unseen = as_recorded(rig, records)
     checked, remarks = _steady([check(r, rig) for r in records], rig)
-    nominal = nominal_problem(checked, rig, settings)
     tested = _steady([check(holdout, rig)], rig)[0][0] if holdout is not None else None
-    if tested is not None:
-        _check_testable(tested, nominal)
     examined = Examined(records, checked, tested, rig)
     with worker_pools() as pools:
+        nominal = nominal_problem(checked, rig, settings, pools.run)
+        if tested is not None:
+            _check_testable(tested, nominal)
         tell("choosing stretches", 0.0)
         used = in_stretches(nominal, settings, pools.run)
         selection, stages = search(used, checked[0].record, tested, pools, tell, settings)
@@ -82,13 +82,13 @@ def diagnose(
 
 
 def nominal_problem(
-    checked: Sequence[Checked], rig: Rig, settings: DiagnosisSettings = DEFAULT
+    checked: Sequence[Checked], rig: Rig, settings: DiagnosisSettings = DEFAULT, run: Map = serial
 ) -> Problem:
     """Return the fit of a rig to checked records, the nominal model; moving loads begin where it has them."""
     cases = tuple(case_from(c.record, rig, c.masked) for c in checked)
     stated = frozenset(e.name for e in rig.effects)
     problem = Problem(cases, rig, unknowns_of(rig, cases), MEASURED, stated=stated)
-    return settled_starts(problem, start_vector(problem.unknowns))[0]
+    return settled_starts(problem, start_vector(problem.unknowns), run)[0]
 
 
 def _check_testable(holdout: Checked, nominal: Problem) -> None:

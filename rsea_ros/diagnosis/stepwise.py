@@ -23,6 +23,7 @@ from rsea_ros.diagnosis.candidate import (
     prior_cost,
     refit,
     rescore,
+    where_it_begins,
     with_noise_reestimated,
 )
 from rsea_ros.diagnosis.criteria import break_tie, is_acceptable, is_far_from_floor, loss_excess, refusal
@@ -208,7 +209,8 @@ def go_on(
         if step.accepted is None:
             break
         trials.append(trial_of(step.accepted, step.accepted.newest, current, "replaced"))
-        models.append(on_fine_steps(refit(with_noise_reestimated(step.accepted), setup), setup))
+        accepted = where_it_begins(step.accepted, setup)
+        models.append(on_fine_steps(refit(with_noise_reestimated(accepted), setup), setup))
     if len(models) == len(selection.models):
         return replace(selection, trials=tuple(trials))
     cases = models[-1].cases

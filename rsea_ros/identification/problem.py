@@ -32,8 +32,8 @@ class Case:
 
     floating: channels whose zero is unknown; they are compared without their means.
     least: by channel its least noise. coloured: channels whose entire residual was
-    taken for noise of the sensor after a fit (noise_level.py). start_shows: what the state at the start does
-    to the residual, orthonormal, shape (m, k), where that state is not known; the residual is without it.
+    taken for noise of the sensor after a fit (noise_level.py). anew: by channel, where states at the start or
+    behind gaps are fitted with each simulation, what a change of each does to it, and which samples tell.
     filters: known ones, by channel.
     """
 
@@ -46,7 +46,7 @@ class Case:
     floating: frozenset[str] = frozenset()
     least: Mapping[str, float] = field(default_factory=dict)
     coloured: frozenset[str] = frozenset()
-    start_shows: FloatArray | None = None
+    anew: Mapping[str, tuple[FloatArray, BoolArray]] = field(default_factory=dict)
     filters: Mapping[str, SensorFilter] = field(default_factory=dict)
 
     def within(self, mask: Mapping[str, BoolArray]) -> Case:
@@ -59,6 +59,7 @@ class Case:
             self, drive=drive, t={n: t[samples[n]] for n, t in self.t.items()},
             measured={n: y[samples[n]] for n, y in self.measured.items()},
             mask={n: m[samples[n]] for n, m in self.mask.items()},
+            anew={n: (shows[samples[n]], tells[samples[n]]) for n, (shows, tells) in self.anew.items()},
         )
 
     def with_noise(self, noise: Mapping[str, float]) -> Case:
@@ -223,7 +224,7 @@ def simulate_cases(
     by_case = [
         [_on_measured_zero(c, torques_along(rigs[name], c.drive))] * len(clocks)
         if isinstance(c.drive, Motion)
-        else [_on_measured_zero(c, outputs) for outputs in next(simulations[name])]
+        else [_begun_anew(c, _on_measured_zero(c, outputs)) for outputs in next(simulations[name])]
         for c, name in zip(cases, names, strict=True)
     ]
     return [[outputs[k] for outputs in by_case] for k in range(len(clocks))]
@@ -234,6 +235,32 @@ def _on_measured_zero(case: Case, outputs: dict[str, FloatArray]) -> dict[str, F
         keep = case.mask[n]
         outputs[n] = outputs[n] + float(np.mean((case.measured[n] - outputs[n])[keep]))
     return outputs
+
+
+def _begun_anew(case: Case, outputs: dict[str, FloatArray]) -> dict[str, FloatArray]:
+    """Add what the states behind gaps that fit best make of outputs, to first order."""
+    if case.anew:
+        change = change_of_starts(case, outputs)
+        outputs |= {n: outputs[n] + case.anew[n][0] @ change for n in case.anew.keys() & outputs.keys()}
+    return outputs
+
+
+def change_of_starts(case: Case, outputs: Mapping[str, FloatArray]) -> FloatArray:
+    """Return the changes of the states behind the gaps of a case that fit best, shape (4 gaps,).
+
+    Zero where outputs ran away.
+    """
+    told = [(n, *shown) for n, shown in case.anew.items() if n in outputs]
+    missing = np.concatenate([(case.measured[n] - outputs[n])[m] / case.noise[n] for n, _, m in told])
+    columns = np.concatenate([shows[m] / case.noise[n] for n, shows, m in told])
+    if not (np.isfinite(missing).all() and np.isfinite(columns).all()):
+        return np.zeros(columns.shape[1])
+    square = columns.T @ columns + _KNOWN * np.eye(columns.shape[1])
+    return np.asarray(np.linalg.solve(square, columns.T @ missing))
+
+
+_KNOWN = 1e-6
+"""What the sensors say of a state behind a gap is trusted to 1000 times its noise."""
 
 
 def _instants(drive: Drive, clocks: Clocks) -> Mapping[str, FloatArray]:
@@ -253,63 +280,48 @@ def weighted_residual(case: Case, outputs: Mapping[str, FloatArray], channels: S
     """
     with np.errstate(over="ignore", invalid="ignore"):
         parts = [((outputs[n] - case.measured[n]) / case.noise[n])[case.mask[n]] for n in channels]
-        residual = np.concatenate(parts)
-        if case.start_shows is not None:
-            residual -= case.start_shows @ (residual @ case.start_shows)
-    return residual
+        return np.concatenate(parts)
 
 
 def with_unknown_start(problem: Problem, theta: FloatArray) -> Problem:
-    """Return a problem whose residuals are without what an error of the state at the start of a case makes.
+    """Return a problem that fits the state at the start of each case with each simulation.
 
-    To first order, about the motion at theta: of position, speed, and the spring as its sensor shows it.
+    To first order, about the motion at theta: position, speed, and the spring as its sensor shows it.
     """
     rig, clocks = apply(problem.rig, problem.unknowns, theta)
-    cases = tuple(replace(c, start_shows=_start_shows(c, rig, clocks, problem)) for c in problem.cases)
-    return replace(problem, cases=cases)
+    cases = list(problem.cases)
+    for i, case in enumerate(cases):
+        if isinstance(case.drive, Drive):
+            _, shown = shown_by_starts(case, [*_other_starts(case.drive, case.noise)], rig, clocks, problem)
+            cases[i] = replace(case, anew={n: (columns, case.mask[n]) for n, columns in shown.items()})
+    return replace(problem, cases=tuple(cases))
 
 
-def _start_shows(case: Case, rig: Rig, clocks: Clocks, problem: Problem) -> FloatArray | None:
-    if not isinstance(case.drive, Drive):
-        return None
-    columns = changed_by_starts(case, [*_other_starts(case.drive, case.noise)], rig, clocks, problem)[1]
-    size = np.linalg.norm(columns, axis=0)
-    columns = columns[:, np.isfinite(size) & (size > 0.0)]
-    left, shares, _ = np.linalg.svd(columns / np.linalg.norm(columns, axis=0), full_matrices=False)
-    return np.asarray(left[:, shares > _SAME])
-
-
-def changed_by_starts(
+def shown_by_starts(
     case: Case, drives: Sequence[Drive], rig: Rig, clocks: Clocks, problem: Problem
-) -> tuple[FloatArray, FloatArray]:
-    """Return the residual of a case, shape (m,), and what each of other drives adds, shape (m, drives)."""
-    moved = [replace(case, drive=drive, start_shows=None) for drive in (case.drive, *drives)]
-    outputs = simulate_cases(moved, rig, clocks, on_angle=problem.on_angle)[0]
-    channels = problem.present(case)
-    base, *others = (weighted_residual(c, out, channels) for c, out in zip(moved, outputs, strict=True))
-    return base, np.column_stack([other - base for other in others])
-
-
-_SAME = 1e-3
-"""Share of the largest below which two states at the start do the same to the residual."""
+) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
+    """Return by channel the outputs of a case, shape (n,), and what other drives add, shape (n, drives)."""
+    moved = [replace(case, drive=drive, anew={}) for drive in (case.drive, *drives)]
+    own, *others = simulate_cases(moved, rig, clocks, on_angle=problem.on_angle)[0]
+    return own, {n: np.stack([o[n] - own[n] for o in others], axis=1) for n in problem.present(case)}
 
 
 def _other_starts(drive: Drive, noise: Mapping[str, float]) -> Iterator[Drive]:
     """Yield a drive from states that are off by what its sensors' noise shows."""
     q, w = drive.initial
-    off = noise.get("position", _OFF)
+    off = noise.get("position", OFF)
     yield replace(drive, initial=(q + off, w))
-    yield replace(drive, initial=(q, w + off / _APART))
+    yield replace(drive, initial=(q, w + off / APART))
     if drive.spring is not None:
         channel, value, rate = drive.spring
         off = noise[channel]
         yield replace(drive, spring=SpringStart(channel, value + off, rate))
-        yield replace(drive, spring=SpringStart(channel, value, rate + off / _APART))
+        yield replace(drive, spring=SpringStart(channel, value, rate + off / APART))
 
 
-_OFF = 1e-4
+OFF = 1e-4
 """rad, where the position is not measured."""
-_APART = 0.03
+APART = 0.03
 """s, over which a rate is known to the noise of its sensor."""
 
 

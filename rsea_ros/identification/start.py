@@ -25,7 +25,14 @@ import numpy as np
 from rsea_ros.effects.parameter import STIFFNESS, TORQUE, Scale, scale_to
 from rsea_ros.errors import RseaError
 from rsea_ros.identification.frequency_response import model_response
-from rsea_ros.identification.problem import Case, Problem, changed_by_starts
+from rsea_ros.identification.problem import (
+    APART,
+    OFF,
+    Case,
+    Problem,
+    change_of_starts,
+    shown_by_starts,
+)
 from rsea_ros.identification.result import FrequencyResponse
 from rsea_ros.identification.solver import Map, descend, serial, solve
 from rsea_ros.identification.unknowns import Clocks, apply, start_vector, unknowns_of_rig
@@ -207,14 +214,6 @@ def _quantile(values: FloatArray) -> float:
     return float(np.quantile(np.abs(values), LARGEST)) if len(values) else 0.0
 
 
-_FEWEST_BEHIND = 16
-"""Samples behind a gap that tell a state."""
-_APART = 0.03
-"""s, over which a rate is known to the noise of its sensor: the size of the changes for derivatives."""
-_SHARES = 1e-6
-"""Of the largest singular value: what is less is not told."""
-
-
 _ROUNDS = 3
 """Fits, and states behind gaps, in turn."""
 
@@ -224,21 +223,17 @@ def settled_starts(problem: Problem, theta: FloatArray, run: Map = serial) -> tu
 
     The same where no record has a gap, or no output moves.
     """
-    settled = with_load_starts(problem, theta)
+    settled = _begun_anew(problem, theta)
     if settled is problem:
         return problem, theta
     for _ in range(_ROUNDS):
         theta = solve(settled, theta, run=run).theta
-        settled = with_load_starts(settled, theta)
-    return replace(settled, cases=tuple(replace(c, start_shows=None) for c in settled.cases)), theta
+        settled = _begun_anew(settled, theta)
+    return settled, theta
 
 
-def with_load_starts(problem: Problem, theta: FloatArray) -> Problem:
-    """Return a problem whose drives begin anew, behind gaps, in the states that fit best at theta.
-
-    Its residuals are without what an error of these states makes, to first order. The same problem where no
-    record has a gap, or no output moves.
-    """
+def _begun_anew(problem: Problem, theta: FloatArray) -> Problem:
+    """Return a problem that begins in the states that fit best at theta, and fits what is left of them."""
     rig, clocks = apply(problem.rig, problem.unknowns, theta)
     cases = tuple(_started(case, rig, clocks, problem) for case in problem.cases)
     same = all(a is b for a, b in zip(cases, problem.cases, strict=True))
@@ -252,21 +247,19 @@ def _started(case: Case, rig: Rig, clocks: Clocks, problem: Problem) -> Case:
     if rig.rigid_spring or mechanics(rig.under(case.source)).order < 2:
         return case
     states = np.array([_state(case, channel, k, drive.step, state) for k, state in drive.restarts])
-    off = case.noise.get("position", 1e-4), case.noise[channel]
-    sizes = np.array([off[0], off[0] / _APART, off[1], off[1] / _APART])
-    own = replace(case, drive=_beginning(drive, channel, states))
+    off = np.array([case.noise.get("position", OFF), case.noise[channel]])
+    sizes = np.outer(off, (1.0, 1.0 / APART)).ravel()
     others = [_beginning(drive, channel, states + change) for change in np.diag(sizes)]
-    base, columns = changed_by_starts(own, others, rig, clocks, problem)
-    channels = problem.present(case)
-    at = np.concatenate([(case.t[n][case.mask[n]] - drive.start) / drive.step for n in channels])
+    begun = replace(case, drive=_beginning(drive, channel, states))
+    own, shown = shown_by_starts(begun, others, rig, clocks, problem)
     ends = [*(k for k, _ in drive.restarts[1:]), len(drive.command)]
-    shows = np.zeros((len(base), 4 * len(states)))
-    for n, (row, (k, _), end) in enumerate(zip(states, drive.restarts, ends, strict=True)):
-        inside = (at >= k) & (at < end) & np.isfinite(columns).all(axis=1) & np.isfinite(base)
-        if np.count_nonzero(inside) >= _FEWEST_BEHIND:
-            row -= sizes * np.linalg.lstsq(columns[inside], base[inside], rcond=_SHARES)[0]
-            shows[inside, 4 * n : 4 * n + 4] = np.linalg.qr(columns[inside])[0]
-    return replace(case, drive=_beginning(drive, channel, states), start_shows=shows)
+    anew = {n: (np.zeros((len(columns), 4 * len(states))), case.mask[n]) for n, columns in shown.items()}
+    for i, ((k, _), end) in enumerate(zip(drive.restarts, ends, strict=True)):
+        for n, columns in shown.items():
+            behind = slice(*np.searchsorted((case.t[n] - drive.start) / drive.step, (k, end)))
+            anew[n][0][behind, 4 * i : 4 * i + 4] = columns[behind]
+    states += sizes * change_of_starts(replace(case, anew=anew), own).reshape(-1, 4)
+    return replace(case, drive=_beginning(drive, channel, states), anew=anew)
 
 
 def _state(

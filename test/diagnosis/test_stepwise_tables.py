@@ -53,6 +53,7 @@ class World:
             "refit": self.refit,
             "with_noise_reestimated": self.reestimate_noise,
             "on_fine_steps": lambda model, setup: model,
+            "where_it_begins": lambda model, setup: model,
             "rescore": self.scored,
             "leaves_only_noise": lambda model, limit: model.validation.ratio("ft") < limit,
             "vector_of": lambda unknowns, start: (unknowns, start),

@@ -8,6 +8,7 @@ from runs import FREE, free_run, trying
 
 from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.identification.identify import identify
+from rsea_ros.model.simulation import simulate
 from rsea_ros.records.record import Channel
 
 
@@ -32,3 +33,16 @@ def test_rows_that_a_recorder_lost_are_no_misfit_where_the_output_moves(gaps, le
         if p.name in ("spring.stiffness", "rotor.reflected_inertia"):
             assert not p.beside_misfit and p.value == pytest.approx(true[p.name], rel=0.01)
     assert diagnose([record], FREE, settings=trying("backlash")).verdict == "nothing_wrong"
+
+
+def test_lost_rows_hide_no_cause():
+    """States behind the gaps fitted without friction left a third of it to others, or hid it whole."""
+    true = FREE.with_effect("coulomb_friction", torque=0.3)
+    coarse = free_run(true).between(0.0, 12.0)
+    finer, own = simulate(true, coarse, refine=8), simulate(true, coarse)
+    channels = {n: Channel(coarse[n].t, coarse[n].y + finer[n] - own[n]) for n in finer}
+    record = with_gaps(coarse.with_channels(**channels), [2.0, 4.5, 8.1], 0.05)
+    diagnosis = diagnose([record], FREE, settings=trying("coulomb_friction", "quadratic_drag"))
+    assert [(c.name, c.status) for c in diagnosis.causes] == [("coulomb_friction", "confirmed")]
+    assert diagnosis.causes[0].parameters["torque"].value == pytest.approx(0.3, rel=0.01)
+    assert diagnosis.verdict == "explained"
