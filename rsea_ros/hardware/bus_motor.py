@@ -17,8 +17,6 @@ T = TypeVar("T")
 ATTEMPTS = 5
 """Of a transaction outside the cycle."""
 BOOT_TIME, BOOT_POLL = 5.0, 0.02
-RETURN = 3.0
-"""s within which a motor that is away at the end may come back, to be switched off."""
 AS_CONFIGURED = "as it was at configure (another one needs cleanup and configure)"
 
 
@@ -140,17 +138,15 @@ class BusMotor(ABC):
     def close(self) -> None:
         """Zero torque, off, port closed. Raises DeviceError where torque may be on that nothing else ends.
 
-        A motor without a watchdog that is away is waited for: its supervisor has only the port that was lost.
+        That is a motor without a watchdog, which is away: its supervisor has only the port that was lost.
         """
         self._let_go()
-        deadline = time.monotonic() + RETURN
-        while self._owes_zero and isinstance(self.protection, Supervised):
-            if time.monotonic() > deadline:
-                raise DeviceError(f"{self.name}: it has not acknowledged zero torque, cut its power")
-            time.sleep(BOOT_POLL)
+        if self._owes_zero and isinstance(self.protection, Supervised):
             with suppress(DeviceError):
                 self._set_up()
             self._let_go()
+            if self._owes_zero:
+                raise DeviceError(f"{self.name}: it has not acknowledged zero torque, cut its power")
 
     def _let_go(self) -> None:
         """Zero torque, off, port closed; where the motor does not acknowledge it, the supervisor tries."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import os
 import sys
+import time
 from collections.abc import Sequence
 from contextlib import ExitStack, suppress
 from typing import Any
@@ -18,6 +19,7 @@ from rclpy.lifecycle import LifecycleNode, LifecycleState, ManagedEntity, Transi
 
 from rsea_ros.documents.wording import printable
 from rsea_ros.errors import DeviceError, ParameterError, RseaError
+from rsea_ros.hardware.device import Device
 from rsea_ros.hardware.limits import CHANGEABLE
 from rsea_ros.hardware.outside import EXTRA_PATH, options_of
 from rsea_ros.nodes._bench_topics import COMMAND_TYPE, NAMES, SPRING_FRAME, Combined
@@ -53,6 +55,8 @@ TABLE = (
 )
 PATIENCE = 10.0
 """s that a reboot may take which is under way when the program ends."""
+RETURN, POLL = 3.0, 0.02
+"""s within which motors that are away at the end may come back, to be switched off; between two looks."""
 
 
 class DriverNode(ManagedEntity, Program):
@@ -87,7 +91,7 @@ class DriverNode(ManagedEntity, Program):
         self._combined: Combined | None = None
         node.add_managed_entity(self)
         let_change(node, TABLE, self._change)
-        self._changed = False
+        self._changed = self._is_open = False
         self._zero_first = values["autostart"] and not values["resume"]
         if values["autostart"] and node.trigger_configure() == TransitionCallbackReturn.SUCCESS:
             node.trigger_activate()
@@ -111,6 +115,7 @@ class DriverNode(ManagedEntity, Program):
         for joint in self.joints:
             joint.runs_in(self._cycle)
         keep_time(self._node, self._cycle, self._values)
+        self._is_open = True
         return TransitionCallbackReturn.SUCCESS
 
     def _renew_devices(self) -> None:
@@ -184,7 +189,6 @@ class DriverNode(ManagedEntity, Program):
         for joint in self.joints:
             joint.guarded.interlock.disable()
         self._jobs.join(PATIENCE)
-        was_open = self._cycle is not None
         with ExitStack() as kept:  # each whatever the one before raises
             kept.callback(self._take_topics_away)
             if self._cycle is not None:
@@ -192,8 +196,9 @@ class DriverNode(ManagedEntity, Program):
             kept.callback(self._close_devices)
             if self._cycle is not None:
                 self._cycle.stop()
-        if was_open:
+        if self._is_open:
             self._node.get_logger().info("torque zero, device closed")
+        self._is_open = False
 
     def _take_topics_away(self) -> None:
         for joint in self.joints:
@@ -204,9 +209,10 @@ class DriverNode(ManagedEntity, Program):
 
     def _close_devices(self) -> None:
         """Close every device whatever one raises; all torques are zero before the first, slow, close."""
+        end = time.monotonic() + RETURN
         with ExitStack() as kept:
             for joint in self.joints:
-                kept.callback(joint.guarded.device.close)
+                kept.callback(_close, joint.guarded.device, end)
             if self._cycle is not None and len(self.joints) > 1:
                 self._zero()
 
@@ -258,6 +264,17 @@ class DriverNode(ManagedEntity, Program):
         if failed:
             raise DeviceError("; ".join((*failed, *done)))
         return ", ".join(done)
+
+
+def _close(device: Device, end: float) -> None:
+    """Close a device, again until an instant (s) where it is away with its torque on. Raises DeviceError."""
+    while True:
+        try:
+            return device.close()
+        except DeviceError:
+            if time.monotonic() > end:
+                raise
+        time.sleep(POLL)
 
 
 NODE = Component(

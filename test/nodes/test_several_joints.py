@@ -252,6 +252,28 @@ def test_all_torques_are_zero_before_the_first_motor_is_closed(listener, monkeyp
     assert set(order[2:]) == {("hip", "closed"), ("knee", "closed")}
 
 
+def test_motors_that_are_away_at_cleanup_are_waited_for_together(make_driver, monkeypatch, capfd):
+    """3 s of each, one after the other; and the cleanup that switched them off at last did not say so."""
+    monkeypatch.setattr(driver, "RETURN", 0.3)
+    spies, away = {"hip": Spy(), "knee": Spy()}, [DeviceError("it is away")]
+
+    def close():
+        if away:
+            raise away[0]
+
+    for spy in spies.values():
+        monkeypatch.setattr(spy, "close", close)
+    monkeypatch.setattr(driver, "DEVICES", {"simulated": lambda values: spies[values["joint"]]})
+    program, _ = make_driver("waited", values=values_of(joints=["hip", "knee"], autostart=True, resume=True))
+    began = time.monotonic()
+    with pytest.raises(DeviceError, match="it is away"):
+        program.close()
+    assert 0.3 < time.monotonic() - began < 0.6
+    away.clear()
+    program.close()
+    assert capfd.readouterr().err.count("torque zero, device closed") == 1
+
+
 @pytest.mark.parametrize(
     ("wrong", "right", "causes", "most"),
     [
