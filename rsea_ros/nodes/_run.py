@@ -5,10 +5,13 @@ listens and was stopped (SIGSTOP) while taking a message out. And Fast DDS 3 ask
 once: where the question comes too soon, the node never hears it. So nodes use sockets, and ask for no types.
 """
 
+import errno
 import faulthandler
+import hashlib
 import math
 import os
 import signal
+import socket
 import stat
 import sys
 import threading
@@ -121,15 +124,38 @@ class Member:
             self.node = component.kind(name or component.name, **options)
         except RuntimeError as error:  # of middleware that cannot, as with security that it does not have
             raise RseaError(str(error).split(", at /")[0]) from None
-        known = {p.name for other in others for p in other.table}
-        self.program = component.make(self.node, declare(self.node, component.table, component.more, known))
-        executor.add_node(self.node)
+        with ExitStack() as kept:
+            kept.callback(self.node.destroy_node)
+            if component.kind is not Node:
+                kept.enter_context(_claim(self.node))
+            known = {p.name for other in others for p in other.table}
+            self.program = component.make(
+                self.node, declare(self.node, component.table, component.more, known)
+            )
+            executor.add_node(self.node)
+            self._kept = kept.pop_all()
 
     def close(self) -> None:
         """End it."""
         self.program.close()
         self._executor.remove_node(self.node)
-        self.node.destroy_node()
+        self._kept.close()
+
+
+def _claim(node: Node) -> socket.socket:
+    """Return what holds a node's name on this machine until it is closed, or the process is dead.
+
+    Of two drivers of one name either answers a stop. Raises RseaError where another one has the name.
+    """
+    name, held = node.get_fully_qualified_name(), socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+    place = hashlib.sha256(f"{node.context.get_domain_id()} {name}".encode()).hexdigest()
+    try:
+        held.bind(f"\0rsea_ros {place}")  # of Linux: no file, and gone with whoever has it
+    except OSError as error:
+        if error.errno == errno.EADDRINUSE:
+            held.close()
+            raise RseaError(f"a node called {name} runs on this machine, expected none") from None
+    return held
 
 
 def run_nodes(components: Sequence[Component], arguments: Sequence[str] = ()) -> int:

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -134,6 +135,7 @@ def test_one_signal_ends_all_of_them_at_zero_torque(joint, listener):
 def test_a_driver_is_made_last_in_whatever_order_they_are_named():
     """Named after the controller it was active while that designed its gains, and heard no stop."""
     words = [w for key, value in GIVEN.items() for w in ("-p", f"{key}:={as_argument(value)}")]
+    words += ["-r", "__ns:=/last"]
     command = [sys.executable, "-m", "rsea_ros.nodes.joint", "controller", "driver", "--ros-args", *words]
     made = subprocess.Popen(command, env={**os.environ, "PYTHONPATH": str(ROOT)}, stderr=subprocess.PIPE)
     told = []
@@ -165,6 +167,16 @@ def test_nodes_are_made_in_a_process_and_executor_of_ones_own(listener):
         right.close()
     assert not executor.get_nodes()
     executor.shutdown()
+
+
+def test_a_second_driver_of_one_name_does_not_live(listener):
+    """It answered a stop by "not configured", success, while the motor of the first one turned."""
+    make = partial(compose, "driver", listener.executor, name="only", namespace="one")
+    for _ in range(2):
+        first = make()
+        with pytest.raises(RseaError, match="a node called /one/only runs on this machine, expected none"):
+            make()
+        first.close()
 
 
 class Limits(SimpleNamespace):
