@@ -65,9 +65,10 @@ class Commanded(Driven):
         From the start: the bench's position jumped while a stall let no cycle see it, and jumped back.
         """
         answers = [self.trigger("clear_fault")]
-        if not answers[0].success and "expected cleanup and configure" in answers[0].message:
-            for transition in (Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_CLEANUP):
-                self.change(transition)
+        if any(words in answers[0].message for words in ("cleanup and configure", "is not configured")):
+            for transition in ("DEACTIVATE", "CLEANUP", "CONFIGURE"):
+                self.change(getattr(Transition, f"TRANSITION_{transition}"))
+            answers.append(self.trigger("clear_fault"))
         if not answers[0].success and "expected a reboot" in answers[0].message:
             answers.append(self.trigger("reboot"))
         self.health.clear()
