@@ -1,7 +1,5 @@
 """What benches of nodes share: nodes in processes, their ROS domain, priorities and processor time."""
 
-from __future__ import annotations
-
 import os
 import random
 import signal

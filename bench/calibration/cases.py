@@ -6,8 +6,6 @@ shares no code with it and has such laws in its mechanics too. Coefficients are 
 judged on the latter.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 

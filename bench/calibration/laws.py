@@ -1,7 +1,5 @@
 """Laws that no catalogue has, put into the command or the sensors of a calibration record."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 

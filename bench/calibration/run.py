@@ -1,7 +1,5 @@
 """Make, fit and score the probabilities of causes."""
 
-from __future__ import annotations
-
 import time
 import traceback
 from collections.abc import Iterator, Mapping

@@ -1,7 +1,5 @@
 """Fit the probability of a cause to cached evidence, and score it: reliability, Brier score, wrong names."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 from typing import Any, NamedTuple

@@ -7,8 +7,6 @@ and with an encoder on the link), impedance (the outer loop), link (the benefit 
 and users (docs/baselines.md). Through real nodes: `driver controller`.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator
 from typing import Annotated

@@ -10,8 +10,6 @@ softest output at 1 and 3 Hz that keep what is asked of ours (synthesis.py): the
 sensitivities and noise.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field

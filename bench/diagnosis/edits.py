@@ -6,8 +6,6 @@ nothing is fitted, and a fresh run is predicted. Error: RMS over that of a fresh
     python -m bench diagnosis edits [--seed 1] [--minutes 8]      resumes
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A record of known cause, diagnosed: what is said beside the truth, as a line of JSON."""
 
-from __future__ import annotations
-
 import hashlib
 import importlib
 import json

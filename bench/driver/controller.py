@@ -10,8 +10,6 @@ So do the kernel's workers that are its wire (`hurried_wire`). At SCHED_FIFO eac
 of its own (cpu_affinity), the bench to none.
 """
 
-from __future__ import annotations
-
 import math
 import os
 import subprocess

@@ -4,8 +4,6 @@ RSEA_BENCH_TIMES names the file: a row for each cycle, ns: due, begun, sample (m
 The last two are 0 where no reply came in time.
 """
 
-from __future__ import annotations
-
 import atexit
 import os
 import sys

@@ -1,7 +1,5 @@
 """A client of the controller: it sends desired torques and hears the bench."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from typing import Any

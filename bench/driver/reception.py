@@ -1,7 +1,5 @@
 """Delays from stamp to reception by the middleware, in a process that subscribes."""
 
-from __future__ import annotations
-
 import struct
 import time
 from collections.abc import Mapping

@@ -7,8 +7,6 @@ Its lateness is that of pseudo-terminal and bench: the kernel passes the bytes o
 priority. A driver is late less often only where it does not wait for a reply.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

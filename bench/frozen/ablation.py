@@ -5,8 +5,6 @@ run of a record notes which branches ever do something. Only those are played ag
 change a number. Branches that act after the search are played again from the search's end.
 """
 
-from __future__ import annotations
-
 import contextlib
 import importlib
 import itertools

@@ -1,7 +1,5 @@
 """The records whose diagnosis is frozen, by set: how each is made, so that only one is in memory."""
 
-from __future__ import annotations
-
 import importlib
 import math
 import sys

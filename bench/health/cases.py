@@ -1,7 +1,5 @@
 """Joints of test/independent at work, first healthy and then with a fault, and the monitor's findings."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace

@@ -5,8 +5,6 @@ faults  each fault switched on after five minutes of work: named, delay, size
 node    CPU of the node with its subscriptions, beside plant and excite, while it learns and afterwards
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator
 

@@ -5,8 +5,6 @@ dropped, doubled and renamed: records of MCAP, statements on a database, nodes o
 and JSON, lines and cells of text, members of NPZ, columns of Parquet.
 """
 
-from __future__ import annotations
-
 import copy
 import gzip
 import io

@@ -5,8 +5,6 @@ that brought a new answer, and damages it further: a cheap stand-in for the cove
 the code behind the first check.
 """
 
-from __future__ import annotations
-
 import gzip
 import json
 import random

@@ -1,7 +1,5 @@
 """The matrix: every rig, every verb, every subset of channels, and pairs of values of all other factors."""
 
-from __future__ import annotations
-
 import random
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial

@@ -1,7 +1,5 @@
 """Tables that are imported: well-formed files of each format with their maps, and a reader."""
 
-from __future__ import annotations
-
 import io
 import json
 from collections.abc import Callable, Mapping, Sequence

@@ -5,8 +5,6 @@ only judges. Catalogue effects and the laws written here are simulated by the st
 are not the rig's; the others by the second bench of the tests, which shares no code with the model.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass

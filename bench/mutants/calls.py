@@ -4,8 +4,6 @@ The notes are kept in out/mutant-calls.txt, which you delete after a change of t
 noted by nobody: its module's and its importers' tests play it.
 """
 
-from __future__ import annotations
-
 import ast
 import os
 import subprocess

@@ -7,8 +7,6 @@ anybody could notice: `strict=` of zip, which only asserts; None for False, whic
 1e-9, which are room for rounding; how long one waits for what comes anyway; seeds of random numbers.
 """
 
-from __future__ import annotations
-
 import ast
 import copy
 import re

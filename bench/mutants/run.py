@@ -3,8 +3,6 @@
 The other processes that the tests start import it so too.
 """
 
-from __future__ import annotations
-
 import ast
 import os
 import resource

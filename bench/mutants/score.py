@@ -7,8 +7,6 @@ are noticed.
 Tests that wait for nodes and wires come last. A fault is noticed by them where they pass without it.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Generator, Mapping
 from random import Random

@@ -5,8 +5,6 @@ between h and g), clamped or with a free housing, and of an actuator 95 times li
 project's simulation or effects.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -4,8 +4,6 @@ RSEA_BENCH_TIMES names the file: a row for each wrench that came alone: when (ns
 wall and CPU time of the callback to the last publication, and of observer with flag alone, ns.
 """
 
-from __future__ import annotations
-
 import atexit
 import os
 import sys

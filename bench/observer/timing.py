@@ -8,8 +8,6 @@ loop with absolute deadlines.
 caches are warm. After a sleep of a period they are not: that is the machine's share of the node's time.
 """
 
-from __future__ import annotations
-
 import tempfile
 import time
 from collections.abc import Iterator

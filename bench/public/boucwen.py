@@ -8,8 +8,6 @@ The lock has no HDF5 library: `arrays` reads 64-bit floats of the old format in 
 has them. Source: HDF5 File Format Specification 3.0, sections II.A, III.A to III.D, IV.A.
 """
 
-from __future__ import annotations
-
 import struct
 from itertools import product
 from pathlib import Path

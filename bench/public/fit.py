@@ -4,8 +4,6 @@ The simulation, the effects and the solver are the project's; nothing is fitted 
 numbers of its initial state, and those on the first samples only, which no score counts.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path

@@ -8,8 +8,6 @@ the initial state.
 Data: ../shared/realdata, beside the repository; download and licences: nonlinearbenchmark.org.
 """
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Generator
