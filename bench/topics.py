@@ -28,7 +28,7 @@ TOPICS: Mapping[str, Mapping[str, str]] = {
         **_mains("intervals", "settings"),
     },
     "frozen": _mains("play", "ablation"),
-    "calibration": _named("run", "make", "fit", "score"),
+    "calibration": _named("score", "make", "fit", "score"),
     "control": _mains("tables"),
     "experiment": _named("score", "causes", "summary"),
     "fleet": _mains("trends"),
