@@ -167,10 +167,7 @@ def _spread(entries: Sequence[Entry], count: int, name: str = "") -> Iterator[En
 
 
 SETS: Mapping[str, Callable[[], Iterator[Entry]]] = {
-    "quick": quick_records,
-    "cases": case_records,
-    "realdata": real_records,
-    "plants": plant_records,
+    "quick": quick_records, "cases": case_records, "realdata": real_records, "plants": plant_records,
     "bench": bench_records,
-}
+}  # fmt: skip
 """By name: the entries of a set. `quick` is the subset that is played after a change."""

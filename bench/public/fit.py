@@ -45,12 +45,8 @@ def record_of(command: FloatArray, position: FloatArray, rate: float) -> Record:
 
 
 def case_of(
-    rig: Rig,
-    record: Record,
-    skip: int,
-    refine: int = REFINE,
-    initial: tuple[float, float] = (0.0, 0.0),
-) -> Case:
+    rig: Rig, record: Record, skip: int, refine: int = REFINE, initial: tuple[float, float] = (0.0, 0.0),
+) -> Case:  # fmt: skip
     """Return a record ready to be fitted to its position.
 
     skip: samples at the start that no residual looks at: the initial state, position and velocity, decays in
