@@ -8,8 +8,6 @@ The signature of a section's function is its command line: keywords are options,
 lines `name: …` of its text are their help.
 """
 
-from __future__ import annotations
-
 import argparse
 import importlib
 import inspect

@@ -1,7 +1,5 @@
 """What benches of nodes share: nodes in processes, their ROS domain, priorities and processor time."""
 
-from __future__ import annotations
-
 import os
 import random
 import signal
@@ -44,19 +42,17 @@ def may_have(priority: int) -> bool:
 
 @contextmanager
 def run_node(
-    name: str, *, priority: int = 0, folder: Path | None = None, **parameters: object
+    name: str, *, priority: int = 0, folder: Path | None = None, noted: bool = False, **parameters: object
 ) -> Iterator[subprocess.Popen[bytes]]:
     """Run a node in a process of its own; SIGINT ends it.
 
-    name: of the package, or TOPIC/FILE of a program of bench that runs a node and notes its times. priority:
-    of SCHED_FIFO for all of it, 0: none. folder: for its log, and NAME.npy with the notes.
+    priority: of SCHED_FIFO for all of it, 0: none. folder: for its log. noted: and for its times, NAME.npy.
     """
-    program = [str(ROOT / "bench" / f"{name}.py")] if "/" in name else ["-m", f"rsea_ros.nodes.{name}"]
+    program = [str(ROOT / "bench" / "noted.py"), name] if noted else ["-m", f"rsea_ros.nodes.{name}"]
     environment, log = {**os.environ, "PYTHONPATH": str(ROOT)}, Path(os.devnull)
     if folder is not None:
-        stem = folder / name.replace("/", "-")
-        environment |= {"ROS_LOG_DIR": str(folder), NOTES: f"{stem}.npy"}
-        log = stem.with_suffix(".log")
+        environment |= {"ROS_LOG_DIR": str(folder), NOTES: str(folder / f"{name}.npy")}
+        log = folder / f"{name}.log"
     with log.open("wb") as file:
         process = subprocess.Popen(
             [sys.executable, *program, "--ros-args", *parameter_words(parameters)], cwd=ROOT,

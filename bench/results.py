@@ -4,8 +4,6 @@ In a page, the rows of a table below `<!-- rows: TOPIC SECTION -->`, head and ru
 the first column is the row, `required` what is asked, each other column what was measured under its name.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import platform

@@ -1,7 +1,5 @@
 """The topics and their sections: which there are, and what each measures."""
 
-from __future__ import annotations
-
 import ast
 from collections.abc import Iterator, Mapping
 
@@ -22,19 +20,18 @@ TOPICS: Mapping[str, Mapping[str, str]] = {
         **_named("controller", "controller", "restarts"),
     },
     "observer": {
-        "lacks": "lacks:lacks", "noise": "flag:noise",
-        "flag": "flag:flag", "tight": "timing:tight", "timing": "timing:timing",
+        "lacks": "lacks:lacks", "flag": "flag:flag", "tight": "timing:tight", "timing": "timing:timing",
     },
     "health": _named("score", "alarms", "faults", "node"),
     "diagnosis": {
         "score": "score", **_named("hidden", "coverage", "overlap"), **_named("edits", "edits"),
-        **_mains("intervals", "settings", "model_doubt"),
+        **_mains("intervals", "settings"),
     },
     "frozen": _mains("play", "ablation"),
-    "calibration": _named("run", "make", "fit", "score"),
+    "calibration": _named("score", "make", "fit", "score"),
     "control": _mains("tables"),
-    "experiment": _named("score", "causes", "summary", "limits"),
-    "fleet": _named("trends", "trends", "pages"),
+    "experiment": _named("score", "causes", "summary"),
+    "fleet": _mains("trends"),
     "inputs": _mains("score"),
     "laws": _mains("score"),
     "mutants": _mains("score"),

@@ -192,7 +192,7 @@ def test_every_kind_of_argument_counts():
 SPACED = re.compile(r"(?<![A-Za-z(])[mk]?N ?m(?![A-Za-z])|kg m\^2")
 ALONE = re.compile(r"(1/|rad/)?\(?([mk]?N ?m|kg m\^2)\)?(\^\d)?( s(\^\d)?)?((/\(?(rad|s|A)\)?)(\^\d)?){0,2}")
 READ_AS_FILES = (
-    "units.py", "effect_source.py", "column_units.py", "factors.py", "bench/inputs/tables.py",
+    "units.py", "effect_source.py", "column_units.py", "factors.py", "bench/inputs/formats.py",
 )  # fmt: skip
 """Modules that read units, or write files."""
 

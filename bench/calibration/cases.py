@@ -6,9 +6,7 @@ shares no code with it and has such laws in its mechanics too. Coefficients are 
 judged on the latter.
 """
 
-from __future__ import annotations
-
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -16,8 +14,8 @@ from independent.bench import drawn_bench, record_command
 from independent.excitations import chirp_noise, odd_multisine
 from independent.hidden import OFF_CATALOGUE
 from independent.severities import SEVERITIES, SIZES, drawn_parameters
+from scipy.signal import cont2discrete, lfilter
 
-from bench.calibration.laws import LAWS, RATE
 from bench.diagnosis.cases import RIG, hide_all, kin_of
 from bench.diagnosis.commands import work
 from rsea_ros.effects.catalogue import catalogue
@@ -26,26 +24,94 @@ from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import measure, simulate
 from rsea_ros.records.record import Channel, FloatArray, Record
 
+RATE = 280.0
+"""Hz, of all records."""
 FAMILIES = ("open", "second", "loop", "second", "sea", "second", "rigid", "second")
 """Plants in the order in which records are made; `second` judges the others."""
 IN_LOOP = ("loop", "rigid")
 """Plants that a position loop drives."""
 GROUPS = {
-    "one": 0.15,
-    "two": 0.22,
-    "three": 0.10,
-    "four": 0.03,
-    "off": 0.15,
-    "off_and_one": 0.18,
-    "off_and_two": 0.08,
-    "taken_out": 0.08,
-    "clean": 0.01,
-}
+    "one": 0.15, "two": 0.22, "three": 0.10, "four": 0.03, "off": 0.15, "off_and_one": 0.18,
+    "off_and_two": 0.08, "taken_out": 0.08, "clean": 0.01,
+}  # fmt: skip
 """Share of the records by hidden causes: effects of the catalogue, a law that it lacks (off), or both."""
 COUNT = {"one": 1, "two": 2, "three": 3, "four": 4, "off_and_one": 1, "off_and_two": 2, "taken_out": 2}
 ON_RIGID = ("coulomb_friction", "stribeck_friction", "asymmetric_friction", "torque_ripple", "damping_drift")
 NOT_ON_SEA = ("torque_constant_error", "current_loop_lag", "hard_stop")
 """Effects that a machine without a measured motor torque cannot tell, or that its travel never meets."""
+
+
+@dataclass(frozen=True)
+class Law:
+    """A law outside the catalogue, in the command before it acts or in the sensors' values.
+
+    on: the plants that show it. known_as: its effect of the catalogue, which then is left out of the search.
+    """
+
+    on: tuple[str, ...]
+    command: Callable[[FloatArray, float], FloatArray] | None = None
+    sensor: Callable | None = None
+    known_as: str = ""
+
+
+def _rate_limit(u: FloatArray, size: float) -> FloatArray:
+    step, out = 1500.0 / size / RATE, np.empty_like(u)
+    last = 0.0
+    for k, wanted in enumerate(u):
+        last += min(max(wanted - last, -step), step)
+        out[k] = last
+    return out
+
+
+def _overshoot(u: FloatArray, size: float) -> FloatArray:
+    w, zeta = 2.0 * np.pi * 40.0, 0.5 / (1.0 + size)
+    b, a, _ = cont2discrete(([w * w], [1.0, 2.0 * zeta * w, w * w]), 1.0 / RATE)
+    return lfilter(b.ravel(), a, u)
+
+
+def _sensor(channel: str, error: Callable[..., FloatArray]) -> Callable:
+    def apply(measured, size, t, rng):
+        y = measured[channel]
+        return {**measured, channel: y + size * error(y, t, rng)}
+
+    return apply
+
+
+def _walk(rng: np.random.Generator, y: FloatArray) -> FloatArray:
+    return np.cumsum(rng.normal(size=len(y))) / np.sqrt(RATE)
+
+
+DRIVEN, WITH_FT = ("open", "sea"), ("open", "sea", "loop")
+FT: Mapping[str, tuple[Callable[..., FloatArray], str]] = {
+    "quadratic_ft": (lambda y, t, rng: 0.004 * y**2, ""),
+    "thermal_ft": (lambda y, t, rng: -np.expm1(-t / (0.2 * t[-1])), "ft_drift"),
+    "walking_ft": (lambda y, t, rng: 0.15 * _walk(rng, y), ""),
+    "cubic_ft": (lambda y, t, rng: 2.0e-4 * y**3 / (1.0 + 0.01 * y**2), ""),
+}
+TORQUE: Mapping[str, Callable[..., FloatArray]] = {
+    "torque_by_position": lambda y, t, rng: 1.5 * np.sin(2.0 * np.pi * t / 1.7),
+    "torque_squared": lambda y, t, rng: 0.01 * y * np.abs(y),
+    "torque_walk": lambda y, t, rng: 0.5 * _walk(rng, y),
+}
+LAWS = {
+    "dead_zone": Law(
+        DRIVEN, lambda u, size: np.sign(u) * np.maximum(np.abs(u) - 3.0 * size, 0.0), known_as="dead_zone"
+    ),
+    "rate_limit": Law(DRIVEN, command=_rate_limit),
+    "fade": Law(
+        DRIVEN, lambda u, size: u * (1.0 - 0.2 * size * np.linspace(0.0, 1.0, len(u))),
+        known_as="torque_constant_drift",
+    ),
+    "one_sided_gain": Law(DRIVEN, lambda u, size: np.where(u > 0.0, (1.0 + 0.12 * size) * u, u)),
+    "overshoot": Law(DRIVEN, command=_overshoot, known_as="current_loop_overshoot"),
+    **{name: Law(WITH_FT, sensor=_sensor("ft", law), known_as=known) for name, (law, known) in FT.items()},
+    "eccentric_encoder": Law(
+        WITH_FT, sensor=_sensor("position", lambda y, t, rng: 1.0e-4 * np.sin(502.0 * y)),
+        known_as="encoder_eccentricity",
+    ),
+    **{name: Law(("rigid",), sensor=_sensor("motor_torque", law)) for name, law in TORQUE.items()},
+}  # fmt: skip
+"""Laws outside the catalogue by name."""
 
 
 @dataclass(frozen=True)
@@ -89,18 +155,11 @@ def _plan(k: int, rng: np.random.Generator) -> Plan:
         off = (str(rng.choice(laws)), float(rng.choice((0.5, 1.0, 1.6)) * rng.uniform(0.8, 1.2)))
     known = LAWS[off[0]].known_as if off and family != "second" else ""  # not for the diagnosis to use
     kinds = ("work", "work", "steps") if family in IN_LOOP else ("chirp", "multisine", "work")
-    return Plan(
-        name=f"{k:04d}-{family}-{group}",
-        family=family,
-        group=group,
-        seed=int(rng.integers(1, 2**31)),
-        excitation=str(rng.choice(kinds)),
-        duration=float(rng.choice((10.0, 12.0))),
-        hidden=hidden,
-        off=off,
-        without=kin_of(names[0]) if group == "taken_out" else (known,) if known in catalogue() else (),
-        coloured=float(rng.choice((0.0, 0.0, 0.05, 0.2))),
-    )
+    without = kin_of(names[0]) if group == "taken_out" else (known,) if known in catalogue() else ()
+    seed, excitation = int(rng.integers(1, 2**31)), str(rng.choice(kinds))
+    duration, coloured = float(rng.choice((10.0, 12.0))), float(rng.choice((0.0, 0.0, 0.05, 0.2)))
+    name = f"{k:04d}-{family}-{group}"
+    return Plan(name, family, group, seed, excitation, duration, hidden, off, without, coloured)
 
 
 def _sizes(name: str, family: str, rng: np.random.Generator) -> dict[str, float]:
@@ -124,7 +183,17 @@ def _drawn_effects(family: str, count: int, rng: np.random.Generator) -> list[st
 def simulate_plan(plan: Plan) -> tuple[Record, Rig]:
     """Simulate a plan; return the record and the rig that a user would diagnose it with."""
     rng = np.random.default_rng(plan.seed)
-    return _second(plan, rng) if plan.family == "second" else _simulate(plan, rng)
+    if plan.family == "second":
+        bench = hide_all(drawn_bench(rng), plan.hidden, plan.off)
+        record, rig = record_command(bench, _command(plan, rng), rng), load_rig(RIG)
+    else:
+        record, rig = _simulate(plan, rng)
+    if not plan.coloured or "ft" not in record:
+        return record, rig
+    white = rng.normal(size=len(record["ft"]))  # noise that falls with frequency, as of an amplifier
+    slow = np.convolve(white, np.exp(-np.arange(40) / 8.0), mode="same")
+    ft = record["ft"].y + plan.coloured * slow / slow.std()
+    return record.with_channels(ft=Channel(record["ft"].t, ft)), rig
 
 
 def _command(plan: Plan, rng: np.random.Generator) -> FloatArray:
@@ -138,12 +207,6 @@ def _command(plan: Plan, rng: np.random.Generator) -> FloatArray:
     return levels + noise * rng.normal(size=len(levels))
 
 
-def _second(plan: Plan, rng: np.random.Generator) -> tuple[Record, Rig]:
-    bench = hide_all(drawn_bench(rng), plan.hidden, plan.off)
-    record = record_command(bench, _command(plan, rng), rng)
-    return _with_colour(record, plan, rng), load_rig(RIG)
-
-
 def _simulate(plan: Plan, rng: np.random.Generator) -> tuple[Record, Rig]:
     """Return a record of one of the project's rigs with drawn values, and the rig as stated."""
     stated = rig_of(plan.family)
@@ -155,7 +218,7 @@ def _simulate(plan: Plan, rng: np.random.Generator) -> tuple[Record, Rig]:
     law = LAWS[plan.off[0]] if plan.off else None
     t = np.arange(round(plan.duration * RATE)) / RATE
     commanded = _command(plan, rng)
-    acting = law.command(commanded, plan.off[1]) if law and law.command and plan.off else commanded
+    acting = law.command(commanded, plan.off[1]) if law and law.command else commanded
     names, late = [n for n in stated.sensors if n != "reference"], t + 1.0 / RATE
     channels = {"command": Channel(t, acting), **{n: Channel(late, np.zeros(len(t))) for n in names}}
     if plan.family in IN_LOOP:  # with a reference, rad, that demands about the commanded torque
@@ -163,11 +226,11 @@ def _simulate(plan: Plan, rng: np.random.Generator) -> tuple[Record, Rig]:
         channels |= {"command": Channel(t, acting - commanded), "reference": Channel(t, softness * commanded)}
     outputs = simulate(true, Record(channels, plan.name))
     measured = {n: measure(true, n, outputs[n], rng) for n in names}
-    if law and law.sensor and plan.off:
+    if law and law.sensor:
         measured = law.sensor(measured, plan.off[1], t, rng)
     channels |= {n: Channel(late, y) for n, y in measured.items()}
     in_loop = Channel(late, measured["motor_torque"]) if plan.family in IN_LOOP else Channel(t, commanded)
-    return _with_colour(Record(channels | {"command": in_loop}, plan.name), plan, rng), stated
+    return Record(channels | {"command": in_loop}, plan.name), stated
 
 
 def rig_of(family: str) -> Rig:
@@ -187,13 +250,3 @@ def rig_of(family: str) -> Rig:
     }
     sensors = {n: s for n, s in rig.sensors.items() if n in ("ft", "position")}
     return replace(rig, quantities=quantities, sensors=sensors)
-
-
-def _with_colour(record: Record, plan: Plan, rng: np.random.Generator) -> Record:
-    """Return the record with noise of the F/T sensor that falls with frequency, as of an amplifier."""
-    if not plan.coloured or "ft" not in record:
-        return record
-    white = rng.normal(size=len(record["ft"]))
-    slow = np.convolve(white, np.exp(-np.arange(40) / 8.0), mode="same")
-    ft = record["ft"].y + plan.coloured * slow / slow.std()
-    return record.with_channels(ft=Channel(record["ft"].t, ft))

@@ -15,8 +15,6 @@ kong               disturbance observer at the motor, with the inverse of T_d / 
                    Bae, Tomizuka, IEEE/ASME Trans. Mechatronics 14, 2009; rotary SEA: 17, 2012)
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass

@@ -15,8 +15,6 @@ IROS 2007; Tagliamonte, Accoto, IEEE/ASME AIM 2014); sampled, with two samples t
 K_v > 0 leaves passivity somewhere, and the question is from which frequency on.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 

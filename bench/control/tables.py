@@ -7,8 +7,6 @@ and with an encoder on the link), impedance (the outer loop), link (the benefit 
 and users (docs/baselines.md). Through real nodes: `driver controller`.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator
 from typing import Annotated
@@ -38,20 +36,16 @@ def trials(rig: Rig, free: Rig, rate: float) -> Iterator[str]:
     yield f"{rate:g} Hz: {designed.gains}"
     swept = robustness(loads[LOCKED], loads, designed)
     m = swept.margins
-    yield (
-        f"{rate:g} Hz, {designed.uncertainty}, {swept.cases} benches, {swept.unstable} unstable: "
-        f"least phase margin {m.phase:.1f} deg, gain {m.gain:.1f} dB, delay {m.delay:.2f} samples, "
-        f"|S| {swept.sensitivity:.2f} ({swept.where})"
-    )
+    yield (f"{rate:g} Hz, {designed.uncertainty}, {swept.cases} benches, {swept.unstable} unstable: "
+           f"least phase margin {m.phase:.1f} deg, gain {m.gain:.1f} dB, delay {m.delay:.2f} samples, "
+           f"|S| {swept.sensitivity:.2f} ({swept.where})")
     cases = corners(tuple(loads), designed.uncertainty)
     for load in loads:
         mine = (case for case in cases if case.load == load)
         each = {case: tracking_error(loads[LOCKED], loads, case, designed) for case in mine}
         worst = max(each, key=lambda case: each[case])
-        yield (
-            f"{rate:g} Hz, 5 Hz followed, {load}: {100.0 * each[BenchVariant(load)]:.2f} %, "
-            f"worst of {len(each)} corners {100.0 * each[worst]:.2f} % ({worst})"
-        )
+        yield (f"{rate:g} Hz, 5 Hz followed, {load}: {100.0 * each[BenchVariant(load)]:.2f} %, "
+               f"worst of {len(each)} corners {100.0 * each[worst]:.2f} % ({worst})")
 
 
 def unknown(rig: Rig, free: Rig, rate: float) -> Iterator[str]:
@@ -96,10 +90,8 @@ def outer(rig: Rig, free: Rig, rate: float) -> Iterator[str]:
     for damping in (0.0, 2.0, 5.0):
         most = stiffest(rig, designed, damping, 20.0)
         to = passive_to(rig, designed, Virtual(0.9 * most, damping))
-        yield (
-            f"{rate:g} Hz, D_v {damping:g}: Re Z > 0 to 20 Hz for K_v <= {most:.0f} N·m/rad; "
-            f"0.9 of that to {to:.0f} Hz"
-        )
+        yield (f"{rate:g} Hz, D_v {damping:g}: Re Z > 0 to 20 Hz for K_v <= {most:.0f} N·m/rad; "
+               f"0.9 of that to {to:.0f} Hz")
     for virtual in (Virtual(0.0, 0.0), Virtual(200.0, 2.0)):
         z = measure_impedance(rig, designed, virtual, SWEEP)
         yield f"{virtual}: {over_spring(rig, designed, z)}; least Re Z {z.real.min():.1f}"

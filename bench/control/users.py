@@ -10,8 +10,6 @@ softest output at 1 and 3 Hz that keep what is asked of ours (synthesis.py): the
 sensitivities and noise.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -36,8 +34,6 @@ LIMIT = 68.0
 """N m, of the motor."""
 J_ARM, B_ARM, K_ARM = 0.1, 1.0, 20.0
 """An elbow: kg m^2, N m s/rad, N m/rad (Hogan, IEEE Trans. Automatic Control 29, 1984; relaxed)."""
-WALL, WALL_DAMPING = 2e4, 20.0
-"""N m/rad, N m s/rad."""
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]

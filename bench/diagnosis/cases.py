@@ -3,8 +3,6 @@
 `plan(seed)` lists the cases; `Plan.make()` simulates one case, so that a run needs only one in memory.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -32,11 +30,9 @@ from rsea_ros.model.rig_file import load_rig
 
 RIG = "paper_high_impedance"
 RIG_VALUES = {
-    "rotor.reflected_inertia": "j_m",
-    "rotor.reflected_damping": "b_m",
-    "spring.stiffness": "k_s",
-    "spring.damping": "b_s",
-}
+    "rotor.reflected_inertia": "j_m", "rotor.reflected_damping": "b_m",
+    "spring.stiffness": "k_s", "spring.damping": "b_s",
+}  # fmt: skip
 """Value of the rig, and its name on the second bench."""
 FOLDER = SHARED / "cases"
 """Bags from a plant outside this repository, with their truth beside them."""
@@ -49,32 +45,17 @@ IN_TRUTH = {
     ("damping_drift", "relative_change"): "damp_drift",
 }  # fmt: skip
 """Parameters that have another name in the truth file of the shared cases."""
-PAIRS = (
-    ("coulomb_friction", "structural_resonance"),
-    ("coulomb_friction", "backlash"),
-    ("coulomb_friction", "command_delay"),
-    ("coulomb_friction", "nonlinear_spring"),
-    ("coulomb_friction", "torque_ripple"),
-    ("coulomb_friction", "ft_drift"),
-    ("coulomb_friction", "mains_interference"),
-    ("coulomb_friction", "stiffness_drift"),
-    ("backlash", "structural_resonance"),
-    ("backlash", "current_loop_lag"),
-    ("backlash", "ft_bias"),
-    ("nonlinear_spring", "command_delay"),
-    ("nonlinear_spring", "mains_interference"),
-    ("nonlinear_spring", "damping_drift"),
-    ("torque_constant_error", "structural_resonance"),
-    ("torque_constant_error", "command_delay"),
-    ("torque_saturation", "ft_bias"),
-    ("torque_saturation", "structural_resonance"),
-    ("load_dependent_friction", "mains_interference"),
-    ("load_dependent_friction", "current_loop_lag"),
-    ("asymmetric_friction", "structural_resonance"),
-    ("torque_ripple", "ft_sensor_lag"),
-    ("hard_stop", "ft_drift"),
-    ("damping_drift", "structural_resonance"),
-)
+PAIRS = tuple((one, other) for one, others in {
+    "coulomb_friction": ("structural_resonance", "backlash", "command_delay", "nonlinear_spring",
+                         "torque_ripple", "ft_drift", "mains_interference", "stiffness_drift"),
+    "backlash": ("structural_resonance", "current_loop_lag", "ft_bias"),
+    "nonlinear_spring": ("command_delay", "mains_interference", "damping_drift"),
+    "torque_constant_error": ("structural_resonance", "command_delay"),
+    "torque_saturation": ("ft_bias", "structural_resonance"),
+    "load_dependent_friction": ("mains_interference", "current_loop_lag"),
+    "asymmetric_friction": ("structural_resonance",), "torque_ripple": ("ft_sensor_lag",),
+    "hard_stop": ("ft_drift",), "damping_drift": ("structural_resonance",),
+}.items() for other in others)  # fmt: skip
 """Two effects that different parts of the data show."""
 
 READINGS = (
@@ -96,8 +77,20 @@ def hide_all(
 ) -> Bench:
     """Return a bench with effects of the catalogue and a law outside it (name, relative size)."""
     for effect, parameters in effects.items():
-        bench = hide(bench, effect, parameters)
+        if parameters.keys() <= CATALOGUE.get(effect, {}).keys():
+            bench = hide(bench, effect, parameters)
+        else:
+            main = next(iter(parameters))
+            factor = parameters[main] / BESIDE_THE_CONTRACT[effect][0][main]
+            bench = hide_beside_the_contract(bench, effect, factor)
     return hide_off_catalogue(bench, *off) if off else bench
+
+
+def newer_parameters(effect: str, factor: float) -> dict[str, float]:
+    """Return the parameters of an effect that came after the first 23, its medium size times a factor."""
+    parameters, _ = BESIDE_THE_CONTRACT[effect]
+    main = next(iter(parameters))
+    return {**parameters, main: parameters[main] * factor}
 
 
 def kin_of(name: str) -> tuple[str, ...]:
@@ -113,7 +106,6 @@ class Plan:
 
     group: single, pair, clean, off_catalogue, taken_out, faulty, reading, drawn_pair, drawn_triple, newer, or
     unsearched (an effect that a diagnosis does not try unless a rig states it).
-    newer: an effect that came after the first 23, and the factor on its main parameter.
     """
 
     name: str
@@ -123,42 +115,26 @@ class Plan:
     hidden: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     values: Mapping[str, float] = field(default_factory=dict)
     off: tuple[str, float] | None = None
-    newer: tuple[str, float] | None = None
     faults: tuple[str, ...] = ()
     without: tuple[str, ...] = ()
     duration: float = 60.0
-
-    def bench(self) -> Bench:
-        """Return the bench that this case is measured on."""
-        bench = hide_all(drawn_bench(np.random.default_rng(self.seed)), self.hidden)
-        if self.newer:
-            bench = hide_beside_the_contract(bench, *self.newer)
-        return hide_all(bench, {}, self.off).with_values(**self.values)
 
     def make(self, fresh: bool = True, duration: float | None = None) -> Played:
         """Simulate the case: its record with the faults put in, and a fresh record without.
 
         fresh: with that one. duration: of each, s, in place of the plan's.
         """
-        bench, seconds = self.bench(), duration or self.duration
+        plain, seconds = drawn_bench(np.random.default_rng(self.seed)), duration or self.duration
+        bench = hide_all(plain, self.hidden, self.off).with_values(**self.values)
         record = record_run(bench, self.seed + 1, self.excitation, seconds)
         again = record_run(bench, self.seed + 2, self.excitation, seconds) if fresh else None
         rng = np.random.default_rng(self.seed + 3)
         for fault in self.faults:
             record = FAULTS[fault](record, rng)
-        truth = self.truth()
         about = {"group": self.group, "faults": self.faults}
         about |= {"mimics": OFF_CATALOGUE[self.off[0]][1]} if self.off else {}
-        return Played(record, load_rig(RIG), self.without, tuple(truth), truth, fresh=again, about=about)
-
-    def truth(self) -> Mapping[str, Mapping[str, float]]:
-        """Return the hidden effects with their parameters in the catalogue's units."""
-        if not self.newer:
-            return self.hidden
-        effect, factor = self.newer
-        parameters = dict(BESIDE_THE_CONTRACT[effect][0])
-        main = next(iter(parameters))
-        return {effect: {**parameters, main: parameters[main] * factor}}
+        truth = (self.without, tuple(self.hidden), self.hidden)
+        return Played(record, load_rig(RIG), *truth, fresh=again, about=about)
 
 
 def plan(seed: int = 2024) -> tuple[Plan, ...]:
@@ -246,7 +222,7 @@ def _newer(rng: np.random.Generator) -> Iterator[Plan]:
         for k, factor in enumerate((0.5, 1.0, 2.0)):
             name = f"newer-{effect}-{factor:g}"
             group = "newer" if catalogue()[effect].is_searched else "unsearched"
-            yield Plan(name, group, _seed(rng), _excitation(k), newer=(effect, factor))
+            yield Plan(name, group, _seed(rng), _excitation(k), {effect: newer_parameters(effect, factor)})
 
 
 def _readings(rng: np.random.Generator) -> Iterator[Plan]:

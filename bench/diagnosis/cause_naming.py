@@ -4,8 +4,6 @@ That plant shares no code with the model or the effects of the project. What a r
 text of a seed; the seed of a hidden half is in a file that is not in the repository.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import sys
@@ -15,18 +13,12 @@ from pathlib import Path
 
 import numpy as np
 from independent.bench import Bench, drawn_bench, record_command
-from independent.hidden import (
-    BESIDE_THE_CONTRACT,
-    CATALOGUE as CONTRACT,
-    OFF_CATALOGUE,
-    hide,
-    hide_beside_the_contract,
-    hide_off_catalogue as hide_outside,
-)
+from independent.hidden import BESIDE_THE_CONTRACT, CATALOGUE as CONTRACT, OFF_CATALOGUE
 from independent.severities import SEVERITIES, drawn_parameters
 
 sys.path.append(str(Path(__file__).resolve().parents[2]))  # `rsea benchmark make` runs this file
 
+from bench.diagnosis.cases import RIG, hide_all, newer_parameters
 from bench.diagnosis.commands import COMMANDS
 from rsea_extras.benchmark.dataset import COLUMNS, LIMIT, MANIFEST, VERSION, truth_path
 from rsea_extras.benchmark.scoring import RecordTruth, truth_hash
@@ -36,7 +28,6 @@ from rsea_ros.outputs.files import Destination, NewFiles, check_free, write_file
 from rsea_ros.progress import Progress
 from rsea_ros.records.record import UNITS, FloatArray, Record
 
-RIG = "paper_high_impedance"
 GROUPS = {
     (0, False): 0.10, (1, False): 0.35, (2, False): 0.20, (3, False): 0.10, (0, True): 0.12, (1, True): 0.13,
 }  # fmt: skip
@@ -101,14 +92,9 @@ class Hidden:
 
     def within(self, bench: Bench) -> Bench:
         """Return a bench that has it."""
-        for name, parameters in self.effects.items():
-            if name in CONTRACT:
-                bench = hide(bench, name, parameters)
-            else:
-                bench = hide_beside_the_contract(bench, name, _factor(name, parameters))
-        return hide_outside(bench, *self.outside) if self.outside else bench
+        return hide_all(bench, self.effects, self.outside)
 
-    def without(self, name: str) -> Hidden:
+    def without(self, name: str) -> "Hidden":
         """Return what is left without one effect."""
         return replace(self, effects={n: p for n, p in self.effects.items() if n != name})
 
@@ -168,7 +154,7 @@ def times_noise(record: Record, other: Record) -> float:
     return max(rms[n] / noises[n] for n in noises)
 
 
-def _draw(count: int, has_outside: bool, rng: np.random.Generator) -> Hidden:
+def _draw(count: int, has_outside: bool, rng: np.random.Generator) -> "Hidden":
     """Draw what a record hides: at most one effect at each place of the chain."""
     effects = catalogue()
     outside = None
@@ -187,11 +173,4 @@ def _parameters(name: str, rng: np.random.Generator) -> Mapping[str, float]:
     """Return parameters of an effect of random size, in the catalogue's units."""
     if name in CONTRACT:
         return drawn_parameters(name, str(rng.choice(SEVERITIES)), rng)
-    parameters, _ = BESIDE_THE_CONTRACT[name]
-    main = next(iter(parameters))
-    return {**parameters, main: parameters[main] * float(rng.uniform(0.6, 1.8))}
-
-
-def _factor(name: str, parameters: Mapping[str, float]) -> float:
-    main = next(iter(parameters))
-    return parameters[main] / float(BESIDE_THE_CONTRACT[name][0][main])
+    return newer_parameters(name, float(rng.uniform(0.6, 1.8)))

@@ -1,7 +1,5 @@
 """Commands of benches, and of machines at work: six kinds, each for a bench of test/independent."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 
 import numpy as np

@@ -6,10 +6,8 @@ nothing is fitted, and a fresh run is predicted. Error: RMS over that of a fresh
     python -m bench diagnosis edits [--seed 1] [--minutes 8]      resumes
 """
 
-from __future__ import annotations
-
-import time
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +16,7 @@ from independent.severities import SIZES, drawn_parameters
 
 from bench import ROOT
 from bench.diagnosis.cases import PAIRS, RIG, hide_all
-from bench.results import Row, append_line, read_lines
+from bench.results import Row, read_lines, resumed
 from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.diagnosis.edit import edited
 from rsea_ros.diagnosis.result import SAME
@@ -37,19 +35,14 @@ def edits(
     seed: of machines, sizes and runs
     minutes: begin no record after that
     duration: of records, s
-    log: JSON lines, a cause each
+    log: JSON lines, a record each
     """
     log = log or ROOT / "out" / f"edits-{seed}.jsonl"
-    done = {line["record"] for line in read_lines(log)}
-    begun = time.monotonic()
-    for hidden in (*((name,) for name in SIZES), *PAIRS):
-        name = "+".join(hidden)
-        if name not in done and time.monotonic() - begun < 60.0 * minutes:
-            for line in _played(hidden, seed, duration):
-                append_line(log, {"record": name, **line})
-                yield f"{name}: {line}"
-    lines = read_lines(log)
-    told = [line for line in lines if "after" in line]
+    records = (*((name,) for name in SIZES), *PAIRS)
+    works = (("+".join(hidden), partial(_played, hidden, seed, duration)) for hidden in records)
+    for entry in resumed(log, works, "record", minutes):
+        yield f"{entry['record']}: {entry['causes'] or entry['named']}"
+    told = [cause for entry in read_lines(log) for cause in entry["causes"]]
     good = sum(line["after"] <= SAME for line in told)
     median = {k: f"{np.median([line[k] for line in told]):.3g}" for k in ("before", "after", "dense")}
     yield Row("causes named and taken out", "", str(len(told)))
@@ -57,8 +50,8 @@ def edits(
     yield Row("median error: with the cause, without it, dense fit", "", ", ".join(median.values()))
 
 
-def _played(hidden: tuple[str, ...], seed: int, duration: float) -> Iterator[dict[str, object]]:
-    """Yield a line for each hidden effect that is named; `confirmed` ones and others alike."""
+def _played(hidden: tuple[str, ...], seed: int, duration: float) -> dict[str, object]:
+    """Return what is named, and the errors for each hidden effect of that, `confirmed` or not."""
     rng = np.random.default_rng([seed, *map(ord, "+".join(hidden))])
     plant = drawn_bench(rng)
     effects = {name: drawn_parameters(name, "medium", rng) for name in hidden}
@@ -66,13 +59,13 @@ def _played(hidden: tuple[str, ...], seed: int, duration: float) -> Iterator[dic
     machine = hide_all(plant, effects)
     result = diagnose([record_run(machine, runs[0], duration=duration)], load_rig(RIG))
     named = {c.name: c for c in result.causes}
-    if not named.keys() & effects.keys():
-        yield {"named": list(named)}
+    causes = []
     for name in named.keys() & effects.keys():
         rest = hide_all(plant, {n: p for n, p in effects.items() if n != name})
         edit = edited(result, record_run(rest, runs[1], duration=duration), name)
         fresh = predict(record_run(machine, runs[2], duration=duration), result.extended_rig)
         own = fresh[edit.channel].rms_error
         errors = {"before": edit.error_before, "after": edit.error_after, "dense": edit.error_dense_fit}
-        yield {"cause": name, "status": named[name].status, "channel": edit.channel,
-               **{k: round(v / own, 3) for k, v in errors.items()}}  # fmt: skip
+        told = {"cause": name, "status": named[name].status, "channel": edit.channel}
+        causes.append(told | {k: round(v / own, 3) for k, v in errors.items()})
+    return {"record": "+".join(hidden), "named": list(named), "causes": causes}

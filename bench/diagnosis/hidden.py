@@ -15,8 +15,6 @@ be one law. Named: with any status, or as a rival of a named cause. False: a cau
 that is not hidden. One that hides below the noise counts as missed.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from itertools import product

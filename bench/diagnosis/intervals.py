@@ -1,7 +1,5 @@
 """How often identify's 95 % intervals hold the truth, on records of the second bench with something wrong."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from typing import Annotated
 

@@ -1,9 +1,6 @@
 """A record of known cause, diagnosed: what is said beside the truth, as a line of JSON."""
 
-from __future__ import annotations
-
 import hashlib
-import importlib
 import json
 import math
 import time
@@ -15,6 +12,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from bench.results import resumed
+from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.diagnosis.result import CauseParameter, Diagnosis
 from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings
 from rsea_ros.errors import RseaError
@@ -23,7 +21,6 @@ from rsea_ros.model.rig import Rig
 from rsea_ros.records.record import Record
 from rsea_ros.records.statistics import Z95
 
-steps = importlib.import_module("rsea_ros.diagnosis.diagnose")
 OUTSIDE = ("off_catalogue", "taken_out", "unsearched")
 """Groups whose effect the diagnosis does not have, or does not try unless a rig states it."""
 PERIODIC = ("phase", "cycles_per_revolution")
@@ -62,7 +59,7 @@ def play(name: str, played: Played, settings: DiagnosisSettings = DEFAULT) -> di
     begin, clock = time.perf_counter(), time.process_time()
     try:
         settings = replace(settings, without=played.without)
-        result = steps.diagnose([played.record], played.rig, settings=settings)
+        result = diagnose([played.record], played.rig, settings=settings)
     except Exception as error:
         line |= {"verdict": f"error: {error}", "causes": [], "digest": "", "remarks": [], "faults_found": []}
         line |= {} if isinstance(error, RseaError) else {"traceback": traceback.format_exc(limit=-3)}

@@ -1,7 +1,5 @@
 """Measure the diagnosis on records of known cause: the issue's measures, a confusion matrix, every case."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path

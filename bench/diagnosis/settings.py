@@ -8,8 +8,6 @@ Right: the hidden causes and no other are named. Wrong: causes named that are no
 named. Changed: records whose causes, statuses or verdict differ from those at the value in use, in bold.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path

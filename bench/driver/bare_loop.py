@@ -5,8 +5,6 @@ With a PORT, each cycle sends the two requests that a driver cannot leave out to
 awaits each reply.
 """
 
-from __future__ import annotations
-
 import os
 import select
 import subprocess

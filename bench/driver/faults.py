@@ -7,8 +7,6 @@ permitted. Where it or this loop stood still for a cycle and the driver did not 
 answer the question: it is repeated, and the repeats are reported.
 """
 
-from __future__ import annotations
-
 import os
 import signal
 import time

@@ -1,7 +1,5 @@
 """The driver's loop without ROS, at absolute deadlines, for measurements of what goes over the wire."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 

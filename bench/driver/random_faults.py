@@ -9,8 +9,6 @@ itself, by its own account, is counted apart: a motor does not stand still, and 
 it.
 """
 
-from __future__ import annotations
-
 import random
 import threading
 import time

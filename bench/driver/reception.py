@@ -1,7 +1,5 @@
 """Delays from stamp to reception by the middleware, in a process that subscribes."""
 
-from __future__ import annotations
-
 import struct
 import time
 from collections.abc import Mapping
@@ -25,20 +23,23 @@ PATIENCE, SETTLE, TICK = 120.0, 4.0, 0.1
 
 
 class Reception:
-    """Listens to topics of /rsea, each with its message class and quality of service, in threads."""
+    """Listens to topics of /rsea, each with its message class and quality of service, in threads.
+
+    delays: of each topic so far, ns.
+    """
 
     def __init__(self, topics: Mapping[str, tuple[Any, QoSProfile]]) -> None:
         if not rclpy.ok():
             rclpy.init()
         self._node = rclpy.create_node(f"reception{time.monotonic_ns()}")
-        self._delays: dict[str, list[int]] = {topic: [] for topic in topics}
+        self.delays: dict[str, list[int]] = {topic: [] for topic in topics}
         self._waiters = [self._listen(topic, *how) for topic, how in topics.items()]
 
     def _listen(self, topic: str, kind: Any, qos: QoSProfile) -> Waiter:
         subscription = self._node.create_subscription(
             kind, f"/rsea/{topic}", lambda message: None, qos, callback_group=Polled(), raw=True
         )
-        delays = self._delays[topic]
+        delays = self.delays[topic]
 
         def take() -> None:
             while (waiting := subscription.handle.take_message(kind, True)) is not None:
@@ -49,21 +50,6 @@ class Reception:
         waiter = Waiter(self._node, [subscription], take, TICK)
         waiter.start()
         return waiter
-
-    def wait(self, topic: str, messages: int = 100) -> None:
-        """Wait until this many messages have arrived."""
-        deadline = time.monotonic() + PATIENCE
-        while len(self._delays[topic]) < messages and time.monotonic() < deadline:
-            time.sleep(TICK)
-
-    def forget(self) -> None:
-        """Discard the messages so far."""
-        for delays in self._delays.values():
-            delays.clear()
-
-    def delays(self, topic: str) -> FloatArray:
-        """Return the delays of a topic so far, ms."""
-        return np.array(self._delays[topic]) / 1e6
 
     def close(self) -> None:
         """End the subscriptions."""
@@ -81,12 +67,15 @@ def beside_bare_loop(
     Returns the delays of topics, ms, the cycles of the loop, and the share of a core.
     """
     reception = Reception(topics)
-    reception.wait(next(iter(topics)))
+    first, deadline = next(iter(reception.delays.values())), time.monotonic() + PATIENCE
+    while len(first) < 100 and time.monotonic() < deadline:
+        time.sleep(TICK)
     time.sleep(SETTLE)
-    reception.forget()
+    for delays in reception.delays.values():
+        delays.clear()
     bare, cpu = BareLoop(rate, seconds, folder, priority), cpu_time(pid)
     time.sleep(seconds)
     cpu = cpu_time(pid) - cpu
-    delays, cycles = {topic: reception.delays(topic) for topic in topics}, bare.cycles()
+    told, cycles = {topic: np.array(d) / 1e6 for topic, d in reception.delays.items()}, bare.cycles()
     reception.close()
-    return delays, cycles, cpu / seconds
+    return told, cycles, cpu / seconds

@@ -3,8 +3,6 @@
 Each row is judged by the torque in the bench's own log while 10 N·m are commanded for 60 cycles after it.
 """
 
-from __future__ import annotations
-
 import resource
 import signal
 import sys

@@ -7,8 +7,6 @@ Its lateness is that of pseudo-terminal and bench: the kernel passes the bytes o
 priority. A driver is late less often only where it does not wait for a reply.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -50,10 +48,10 @@ def _at(rate: float, seconds: float, priority: int, folder: Path, can: str) -> l
             bench.hurry(priority + 1)
         baud = 1_000_000 if can else 4_000_000
         patient |= {"rate": rate, "baud": baud, "realtime_priority": priority, **bench.parameters()}
-        with run_node("driver/node", folder=folder, **patient) as node:
+        with run_node("driver", folder=folder, noted=True, **patient) as node:
             topics = {"joint_states": (JointState, MEASUREMENT)}
             delays, alone, cpu = beside_bare_loop(node.pid, topics, rate, seconds, folder, priority)
-        times = np.load(folder / "driver-node.npy")
+        times = np.load(folder / "driver.npy")
         times = times[(times[:, 1] > alone[0, 1]) & (times[:, 1] < alone[-1, 1])]
         alone_for = min(0.5 * seconds, 60.0)
         floor = "not on CAN" if can else _wire_alone(rate, alone_for, priority, folder, bench)

@@ -2,7 +2,6 @@
 
     causes LOG [FIRST COUNT] [--limits full|lab|work]   hidden-cause benches, one a line of LOG; resumes
     summary LOG                   the figures of those lines
-    limits RUNS                   limit violations in RUNS runs, true values drawn from their intervals
 
 Truth is the second bench of test/independent. Every policy starts from the same poor log, 10 s of slow work
 at 0.5 N m, weighs the same causes by the same rule, and stops at the same probability; what differs is the
@@ -15,8 +14,6 @@ slow work, as for the first runs on a machine with a suspected fault. Limits `wo
 the slow work: no run is stronger than what the machine has already done. seconds: of all runs played, whole.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator
 from functools import partial
@@ -27,22 +24,25 @@ import numpy as np
 from independent.bench import drawn_bench, record_command
 from independent.hidden import hide
 from independent.severities import SEVERITIES, drawn_parameters
+from scipy.optimize import brentq
 
-from bench.experiment.policies import RATE, Fixed, fixed_chirp, random_multisine
 from bench.results import read_lines, resumed
-from rsea_ros.experiment.campaign import Budget, Campaign
-from rsea_ros.experiment.hypothesis import motion
+from rsea_ros.experiment.campaign import Budget, Campaign, Rules
 from rsea_ros.experiment.joint_weighing import USUAL, weigh
-from rsea_ros.experiment.proposal import DesignRequest
+from rsea_ros.experiment.proposal import DesignRequest, peaks
 from rsea_ros.experiment.run_design import propose
-from rsea_ros.experiment.run_shape import RunLimits, largest_share, of_command, of_response
+from rsea_ros.experiment.run_shape import RunLimits, at_rest_around
+from rsea_ros.identification.excitation import ExcitationSettings, chirp, ramp_ends
 from rsea_ros.identification.solver import worker_pools
 from rsea_ros.model.rig_file import load_rig
 
+RATE, CHIRP = 280.0, 20.0
+"""Hz; s."""
+MOST = 0.99
+"""Largest RMS of a clipped multisine as a share of its limit."""
 LIMITS = {
-    "full": RunLimits(torque=25.0, velocity=2.0, deflection=0.04),
-    "lab": RunLimits(torque=3.0, velocity=2.0, deflection=0.04),
-    "work": RunLimits(torque=0.65, velocity=2.0, deflection=0.04),
+    name: RunLimits(torque=torque, velocity=2.0, deflection=0.04)
+    for name, torque in {"full": 25.0, "lab": 3.0, "work": 0.65}.items()
 }
 ALIKE = {"torque_constant_error", "ft_gain_error"}
 """No run separates these without another measurement: proved by experiment/bound.py on each bench."""
@@ -50,10 +50,65 @@ SECONDS = 20.0
 """s of excitation that a policy has."""
 SHORTEST = 0.015
 """s of the first run of a policy, at least (four samples)."""
-DESIGNS = 5
-"""Benches whose designed runs are repeated for the limits."""
 PER_RUN = 0.0
 """s that are as dear as one more run: the bench does not count runs."""
+
+
+class Fixed:
+    """Plays pieces of a command one after another, each as long as all before it together."""
+
+    def __init__(self, command, shortest):
+        self._command, self._at, self._shortest = command, 0, round(shortest * RATE)
+
+    def __call__(self, hypotheses, asked, noise, run, tell):
+        size = max(self._shortest, self._at)
+        piece = self._command[self._at : self._at + size]
+        self._at += len(piece)
+        chances = (1.0,) * len(hypotheses)
+        if hypotheses[0].probability >= Rules.confirmed:  # what a run within the limits could still show
+            chances = propose(hypotheses, asked, noise, run, tell).chances
+        run = ramp_ends(piece, min(round(0.25 * RATE), len(piece) // 4))
+        return _Played(run, tuple(h.name for h in hypotheses), chances)
+
+
+class _Played:
+    """The part of a proposal that the campaign uses."""
+
+    def __init__(self, run, names, chances):
+        command = at_rest_around(run, RATE)
+        self.command, self.duration, self.rate = command, len(run) / RATE, RATE
+        self.names, self.chances = names, chances
+        self.decided = self.resolved = 1.0
+        self.peaks = peaks(command, RATE, ())
+        self.hopeless, self.energy = (), float(np.sum(command**2) / RATE)
+
+
+def fixed_chirp(limits):
+    """Return the paper's chirp without its noise, at the torque limit, N m."""
+    return chirp(
+        ExcitationSettings(rate=RATE, duration=CHIRP, amplitude=limits.torque * 0.98, noise=0.0, low=0.05)
+    )
+
+
+def random_multisine(rms, seed, torque):
+    """Return a multisine of random phases and equal lines in 0.5 to 100 Hz of some RMS, 20 s, N m.
+
+    Clipped at the limit, and so much larger before that its RMS afterwards is as asked. Without clipping, its
+    peak would be about four times its RMS.
+    """
+    rng = np.random.default_rng(seed)
+    n = round(CHIRP * RATE)
+    spectrum = np.zeros(n // 2 + 1, complex)
+    lines = np.arange(round(0.5 * CHIRP), round(100.0 * CHIRP))
+    spectrum[lines] = np.exp(2j * np.pi * rng.random(len(lines)))
+    signal = np.fft.irfft(spectrum, n)
+    signal, asked = signal / signal.std(), min(rms, MOST * torque)
+
+    def excess(log_size):
+        return float(np.std(np.clip(np.exp(log_size) * signal, -torque, torque)) - asked)
+
+    size = np.exp(brentq(excess, np.log(0.5 * asked), np.log(1e4 * torque)))
+    return np.clip(size * signal, -torque, torque)
 
 
 def hidden_case(k):
@@ -118,14 +173,10 @@ def outcome_entry(outcome):
     """Return the part of an outcome that counts."""
     kinds = [getattr(getattr(r.proposal, "shape", None), "kind", "") for r in outcome.rounds if r.proposal]
     return {
-        "end": outcome.end,
-        "cause": outcome.cause,
-        "probability": outcome.weighing.probability[outcome.cause],
-        "seconds": outcome.seconds,
-        "kinds": kinds,
+        "end": outcome.end, "cause": outcome.cause, "seconds": outcome.seconds, "kinds": kinds,
+        "probability": outcome.weighing.probability[outcome.cause], "left": outcome.weighing.left,
         "proofs": [[p.bound.true, p.bound.rival, p.bound.most] for p in outcome.proofs],
-        "left": outcome.weighing.left,
-    }
+    }  # fmt: skip
 
 
 def causes(
@@ -175,45 +226,16 @@ def _pairs(pairs, policy):
     ratio = ours / other
     failed = sum(not good(x, policy) for x in pairs)
     less, more = int(np.sum(ratio < 0.99)), int(np.sum(ratio > 1.01))
-    yield (
-        f"  {policy}: median {np.median(other):.3f} s, designed {np.median(ours):.3f} s, paired median "
-        f"ratio {np.median(ratio):.2f}, geometric mean {np.exp(np.mean(np.log(ratio))):.2f}; designed "
-        f"shorter in {less}, equal in {len(pairs) - less - more}, longer in {more}; {failed} failed"
-    )
+    yield (f"  {policy}: median {np.median(other):.3f} s, designed {np.median(ours):.3f} s, paired median "
+           f"ratio {np.median(ratio):.2f}, geometric mean {np.exp(np.mean(np.log(ratio))):.2f}; designed "
+           f"shorter in {less}, equal in {len(pairs) - less - more}, longer in {more}; {failed} failed")
     long = other > SHORTEST
     if long.any():
-        yield (
-            f"    in the {long.sum()} pairs where it needs more than the shortest run: median "
-            f"{np.median(other[long]):.3f} s, designed {np.median(ours[long]):.3f} s, paired median ratio "
-            f"{np.median(ratio[long]):.2f}"
-        )
+        yield (f"    in the {long.sum()} pairs where it needs more than the shortest run: median "
+               f"{np.median(other[long]):.3f} s, designed {np.median(ours[long]):.3f} s, paired median ratio "
+               f"{np.median(ratio[long]):.2f}")
 
 
 def good(x, policy):
     """Return whether a policy confirmed the right cause."""
     return x[policy]["end"] == "confirmed" and x[policy]["cause"] == x["cause"]
-
-
-def limits(runs: int = 10_000) -> Iterator[str]:
-    """Count violations of limits in designed runs on benches drawn from their intervals."""
-    rig, rng, broken, worst, made = load_rig("paper_high_impedance"), np.random.default_rng(3), 0, 0.0, 0
-    tight = RunLimits(torque=25.0, velocity=1.0, deflection=0.015, ft=22.0)
-    with worker_pools() as pools:
-        designs = []
-        for k in range(DESIGNS):
-            _, bench, *_ = hidden_case(k * 7)
-            first = record_command(bench, slow_work(), np.random.default_rng([18, k]))
-            possible = weigh([first], rig, USUAL, run=pools.run).hypotheses(0.005)[:7]
-            asked = DesignRequest(tight, RATE, probe=1.0, refine=0)
-            designs.append((possible, propose(possible, asked, run=pools.run)))
-        for k in range(runs):
-            possible, proposal = designs[k % len(designs)]
-            shares = np.array([h.probability for h in possible])
-            true = possible[rng.choice(len(possible), p=shares / shares.sum())].draws(1, rng)[0]
-            peaks = of_response(proposal.command, motion(true, proposal.command, RATE))
-            share = largest_share(peaks | of_command(proposal.command, RATE), tight)
-            made, broken, worst = made + 1, broken + (share > 1.0), max(worst, share)
-            if made % 1000 == 0:
-                yield f"{made} runs, {broken} broke a limit, largest share used {worst:.3f}"
-    sizes = [d.peaks.at_level["torque"] for _, d in designs]
-    yield f"{made} runs, {broken} broke a limit; largest share {worst:.3f}; torques {np.round(sizes, 1)}"

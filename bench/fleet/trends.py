@@ -6,11 +6,6 @@ at the recordings so far, as `rsea fleet watch` does. What a recording tells is 
 medians of 108 recordings of that work and wear that were diagnosed in full (November 2026).
 """
 
-from __future__ import annotations
-
-import os
-import tempfile
-import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -21,7 +16,6 @@ import numpy as np
 from independent.bench import drawn_bench
 
 from bench.results import Row, read_lines, resumed
-from rsea_extras.pages.page import write_fleet_report
 from rsea_extras.trends import Alarm, alarms
 from rsea_extras.trends.alarms import by_joint
 
@@ -218,7 +212,7 @@ def _judged(
     }  # fmt: skip
 
 
-def trends(*, log: Path, seeds: int = 10, minutes: float = 3.0) -> Iterator[Row]:
+def main(*, log: Path, seeds: int = 10, minutes: float = 3.0) -> Iterator[Row]:
     """Play simulated fleets over a year: required and measured values, then a row for each kind of wear.
 
     log: JSON lines, a fleet each; goes on where it ends
@@ -243,21 +237,3 @@ def trends(*, log: Path, seeds: int = 10, minutes: float = 3.0) -> Iterator[Row]
             known = [w[name] for w in group if w[name] is not None] or [np.nan]
             told += f"; {name} {np.median(known):.0f} ({min(known):.0f} to {max(known):.0f}) days"
         yield Row(kind, "", told)
-
-
-def pages(*, rows: int = 100_000) -> Iterator[Row]:
-    """Measure how long the report of a fleet takes to write.
-
-    rows: of the history
-    """
-    history, recordings, _ = fleet(1)
-    copies = -(-rows // len(history["joint"]))
-    large = {n: np.concatenate([c] * copies)[:rows] for n, c in history.items()}
-    copy = np.char.add("copy", np.repeat(np.arange(copies), len(history["joint"]))[:rows].astype(str))
-    large["parameter"] = np.char.add(np.char.add(copy, "."), large["parameter"])
-    with tempfile.TemporaryDirectory() as folder:
-        begun, before = time.perf_counter(), time.process_time()
-        write_fleet_report(large, recordings, Path(folder) / "large")
-        seconds, spent = time.perf_counter() - begun, time.process_time() - before
-    load = f"{os.getloadavg()[0]:.0f} processes on {os.cpu_count()} cores"
-    yield Row(f"{rows} rows reported", "<= 10 s", f"{seconds:.1f} s ({spent:.1f} s of processor; {load})")

@@ -2,10 +2,8 @@
 
 A branch stands here as a function of the package and what it returns where the branch does nothing. A first
 run of a record notes which branches ever do something. Only those are played again without: the others cannot
-change a number. Branches that act after the search are played again from the search's end.
+change a number.
 """
-
-from __future__ import annotations
 
 import contextlib
 import importlib
@@ -18,7 +16,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from bench.diagnosis.played import Entry, Line, play as diagnosed, said, steps, verdict_on
+from bench.diagnosis.played import Entry, Line, play as diagnosed, said, verdict_on
 from bench.frozen.cases import bench_records, lab_records, small_records
 from bench.frozen.play import KEPT
 from bench.results import Row, append_line, read_lines
@@ -33,13 +31,12 @@ _WITH = ReducedModels._with
 class Branch(NamedTuple):
     """A branch: its functions, `module:attribute` below rsea_ros.diagnosis, and what each does when off.
 
-    late: it acts after the search. setting: what switches it off, in place of functions.
+    setting: what switches it off, in place of functions.
     acts: whether a call does something, of its result and arguments, where the call without is too dear; of
     the function `noted` where a setting switches the branch off.
     """
 
     functions: Mapping[str, Off] = {}
-    late: bool = False
     setting: tuple[str, str, Any] | None = None
     acts: Callable[..., bool] | None = None
     noted: str = ""
@@ -79,15 +76,15 @@ BRANCHES: Mapping[str, Branch] = {
     "quick replacement dropped": Branch(
         {"backward_elimination:ReducedModels._with": _fitted_on}, acts=_was_dropped),
     "close rivals fitted to the end": Branch(
-        {"naming.weighing:_beside_all_causes": lambda tried, *_: tried}, late=True),
+        {"naming.weighing:_beside_all_causes": lambda tried, *_: tried}),
     "wandering sensor (carried)": Branch(
-        late=True, setting=("naming", "carried", math.inf), noted="naming.status:probabilities_and_status",
+        setting=("naming", "carried", math.inf), noted="naming.status:probabilities_and_status",
         acts=lambda _, every, *__: every[0].signature.carried > DEFAULT.naming.carried),
-    "size open by ten": Branch({"naming.conclusion:is_known": lambda size, rule: True}, late=True),
-    "rig doubtful": Branch({"naming.weighing:is_off_rig": _no}, late=True),
+    "size open by ten": Branch({"naming.conclusion:is_known": lambda size, rule: True}),
+    "rig doubtful": Branch({"naming.weighing:is_off_rig": _no}),
     "known values that pay": Branch({
         "criteria:keeps_known_values": _no, "backward_elimination:keeps_known_values": _no}),
-    "play remark": Branch({"naming.conclusion:undetermined_play": lambda *_: ()}, late=True),
+    "play remark": Branch({"naming.conclusion:undetermined_play": lambda *_: ()}),
     "missed response by coherence": Branch({"score:missed_response": lambda *_: 0.0}),
 }  # fmt: skip
 """By the names of the list in the issue that asked for the table."""
@@ -150,39 +147,16 @@ def _same(a: Any, b: Any) -> bool:
     return a is b or (isinstance(a, bool | float | str) and a == b)
 
 
-@contextlib.contextmanager
-def _kept_search(kept: list[tuple[Any, float]]) -> Iterator[None]:
-    """Keep the search of the first diagnosis within a with statement and its s, and take it in the others."""
-    before = steps.search
-
-    def search(*args: Any, **kwargs: Any) -> Any:
-        if not kept:
-            begin = time.process_time()
-            found = before(*args, **kwargs)
-            kept.append((found, time.process_time() - begin))
-        return kept[0][0]
-
-    steps.search = search
-    try:
-        yield
-    finally:
-        steps.search = before
-
-
 def play(entry: Entry) -> Iterator[dict[str, Any]]:
     """Yield a line of a record as it is, then one without each branch that does something on it."""
     played = entry.make()
     acts: Counter[str] = Counter()
-    kept: list[tuple[Any, float]] = []
-    with _noting(acts), _kept_search(kept):
+    with _noting(acts):
         first = diagnosed(entry.name, played)
     yield {**first, "branch": "", "acts": dict(acts)}
     for name in (n for n in BRANCHES if acts[n]):
-        branch = BRANCHES[name]
-        with _without(branch), _kept_search(kept) if branch.late else contextlib.nullcontext():
-            line = diagnosed(entry.name, played, _settings(branch))
-        saved = kept[0][1] if branch.late and kept else 0.0
-        yield {**line, "branch": name, "processor": round(line["processor"] + saved, 1)}
+        with _without(BRANCHES[name]):
+            yield {**diagnosed(entry.name, played, _settings(BRANCHES[name])), "branch": name}
 
 
 def records() -> Iterator[Entry]:

@@ -1,7 +1,5 @@
 """The records whose diagnosis is frozen, by set: how each is made, so that only one is in memory."""
 
-from __future__ import annotations
-
 import importlib
 import math
 import sys
@@ -169,10 +167,7 @@ def _spread(entries: Sequence[Entry], count: int, name: str = "") -> Iterator[En
 
 
 SETS: Mapping[str, Callable[[], Iterator[Entry]]] = {
-    "quick": quick_records,
-    "cases": case_records,
-    "realdata": real_records,
-    "plants": plant_records,
+    "quick": quick_records, "cases": case_records, "realdata": real_records, "plants": plant_records,
     "bench": bench_records,
-}
+}  # fmt: skip
 """By name: the entries of a set. `quick` is the subset that is played after a change."""

@@ -4,8 +4,6 @@ A line for each record: its verdict; of each cause the name, status, probability
 of their sigma; seconds; and a digest of every number to the last bit.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Generator, Iterable, Iterator, Sequence

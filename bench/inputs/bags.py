@@ -1,7 +1,5 @@
 """The bags of the matrix: a bench simulated with one of each factor, its channels then damaged as asked."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path

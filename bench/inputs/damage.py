@@ -5,8 +5,6 @@ dropped, doubled and renamed: records of MCAP, statements on a database, nodes o
 and JSON, lines and cells of text, members of NPZ, columns of Parquet.
 """
 
-from __future__ import annotations
-
 import copy
 import gzip
 import io
@@ -35,7 +33,7 @@ ODD_DOUBLES = (
 )  # fmt: skip
 
 
-def damage_bytes(rng: random.Random, data: bytes, other: bytes = b"") -> bytes:
+def in_bytes(rng: random.Random, data: bytes, other: bytes = b"") -> bytes:
     """Return bytes with one or a few places changed. other: bytes that may be spliced in."""
     for _ in range(rng.choice((1, 1, 1, 2, 4, 16))):
         data = _damage_once(rng, data, other or data) if data else rng.randbytes(8)
@@ -76,7 +74,7 @@ Parts = list[tuple[Any, Any]]
 """The parts of a file: key (opcode, name) and content."""
 
 
-def damage_parts(rng: random.Random, parts: Parts, odd: Sequence[Any], change: Callable[[Any], Any]) -> Parts:
+def in_parts(rng: random.Random, parts: Parts, odd: Sequence[Any], change: Callable[[Any], Any]) -> Parts:
     """Return parts of which one or two are dropped, doubled, renamed, or changed.
 
     odd: keys that a part may get. change: returns another content.
@@ -108,16 +106,16 @@ def _records_of(data: bytes) -> Parts:
     return found if at == len(data) else []
 
 
-def damaged_mcap(rng: random.Random, data: bytes, other: bytes = b"") -> bytes:
+def in_mcap(rng: random.Random, data: bytes, other: bytes = b"") -> bytes:
     """Return an MCAP file damaged in its bytes or among its records.
 
     test/msg_adapters/test_damaged.py damages messages in chunks whose checksum fits.
     """
     records = _records_of(data[len(MAGIC) : -len(MAGIC)]) if data.startswith(MAGIC) else []
     if not records or rng.random() < 0.25:
-        return damage_bytes(rng, data, other)
+        return in_bytes(rng, data, other)
     odd = (0, 1, 3, 4, 5, 6, 0x0F, 0x0B, 0x42, 0xFF)
-    records = damage_parts(rng, records, odd, partial(damage_bytes, rng))
+    records = in_parts(rng, records, odd, partial(in_bytes, rng))
     whole = b"".join(struct.pack("<BQ", opcode, len(body)) + body for opcode, body in records)
     return MAGIC + whole + rng.choice((MAGIC, MAGIC, MAGIC, b""))
 
@@ -138,10 +136,10 @@ STEPS, LARGEST = 5_000_000, 50_000_000
 would fill the memory of the process that makes them."""
 
 
-def damaged_sqlite(rng: random.Random, data: bytes, other: bytes = b"") -> bytes:
+def in_sqlite(rng: random.Random, data: bytes, other: bytes = b"") -> bytes:
     """Return a database damaged in its bytes or by statements that a program could have run on it."""
     if rng.random() < 0.4:
-        return damage_bytes(rng, data, other)
+        return in_bytes(rng, data, other)
     return _changed_by(data, *(_statement(rng) for _ in range(rng.choice((1, 1, 2, 4)))))
 
 
@@ -209,25 +207,25 @@ _HEADER = (
 )  # fmt: skip
 
 
-def damaged_npz(rng: random.Random, data: bytes, other: bytes = b"") -> bytes:
+def in_npz(rng: random.Random, data: bytes, other: bytes = b"") -> bytes:
     """Return an NPZ file with a member changed, renamed or dropped, or other bytes in it."""
     members: Parts = []
     with suppress(Exception), zipfile.ZipFile(io.BytesIO(data)) as archive:
         members = [(name, archive.read(name)) for name in archive.namelist()]
     if not members or rng.random() < 0.3:
-        return damage_bytes(rng, data, other)
+        return in_bytes(rng, data, other)
 
     def change(held: bytes) -> bytes:
         kind, buffer = rng.randrange(3), io.BytesIO()
         if kind == 0:
             np.lib.format.write_array(buffer, rng.choice(ODD_ARRAYS)(60), allow_pickle=True)
-        return (buffer.getvalue(), held.replace(*rng.choice(_HEADER), 1), damage_bytes(rng, held))[kind]
+        return (buffer.getvalue(), held.replace(*rng.choice(_HEADER), 1), in_bytes(rng, held))[kind]
 
     buffer = io.BytesIO()
     method = rng.choice((zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA))
     odd = ("x.npy", "t", "../t.npy", "t.npy.npy", "ä.npy")
     with zipfile.ZipFile(buffer, "w", method) as archive:
-        for name, held in dict(damage_parts(rng, members, odd, change)).items():
+        for name, held in dict(in_parts(rng, members, odd, change)).items():
             archive.writestr(name, held)
     return buffer.getvalue()
 
@@ -252,17 +250,17 @@ ODD_COLUMNS: tuple[Callable[[int], pa.Array], ...] = (
 )
 
 
-def damaged_parquet(rng: random.Random, data: bytes, other: bytes = b"") -> bytes:
+def in_parquet(rng: random.Random, data: bytes, other: bytes = b"") -> bytes:
     """Return a Parquet file with a column changed, renamed, doubled or dropped, or other bytes in it."""
     try:
         table = pq.read_table(io.BytesIO(data), use_threads=False)
     except Exception:
-        return damage_bytes(rng, data, other)
+        return in_bytes(rng, data, other)
     if rng.random() < 0.5 or not table.num_columns:
-        return damage_bytes(rng, data, other)
+        return in_bytes(rng, data, other)
     columns = list(zip(table.column_names, table.columns, strict=True))
     odd = ("x", "", "a.b", "PHI", "ä")
-    columns = damage_parts(rng, columns, odd, lambda column: rng.choice(ODD_COLUMNS)(len(column)))
+    columns = in_parts(rng, columns, odd, lambda column: rng.choice(ODD_COLUMNS)(len(column)))
     table = pa.table([column for _, column in columns], names=[name for name, _ in columns])
     buffer = io.BytesIO()
     codec = rng.choice(("snappy", "none", "zstd", "gzip", "brotli"))
@@ -337,24 +335,24 @@ def _document(read: Callable[[str], Any], write: Callable[[Any], str]) -> Damage
         if kind < 0.6:
             with suppress(Exception):  # what was damaged before may be no document, or too deep to be written
                 return write(change_nodes(rng, read(data.decode("utf-8")))).encode()
-        return damaged_text(rng, data, other) if kind < 0.85 else damage_bytes(rng, data, other)
+        return in_text(rng, data, other) if kind < 0.85 else in_bytes(rng, data, other)
 
     return damaged
 
 
-damaged_yaml = _document(yaml.safe_load, partial(yaml.safe_dump, sort_keys=False))
-_damaged_json = _document(json.loads, json.dumps)
+in_yaml = _document(yaml.safe_load, partial(yaml.safe_dump, sort_keys=False))
+_in_json = _document(json.loads, json.dumps)
 
 
-def damaged_json(rng: random.Random, data: bytes, other: bytes = b"") -> bytes:
+def in_json(rng: random.Random, data: bytes, other: bytes = b"") -> bytes:
     """Return a JSON document changed in its structure, its text or its bytes, or one nested deeply."""
     if rng.random() < 0.1:
         depth = rng.choice((10, 1000, 100_000))
         return b"[" * depth + b"]" * rng.choice((0, depth))
-    return _damaged_json(rng, data, other)
+    return _in_json(rng, data, other)
 
 
-def damaged_text(rng: random.Random, data: bytes, other: bytes = b"") -> bytes:
+def in_text(rng: random.Random, data: bytes, other: bytes = b"") -> bytes:
     """Return text with lines and words changed, other line ends, encodings and indents."""
     lines = data.decode("utf-8", "replace").splitlines() or [""]
     if rng.random() < 0.5:
@@ -370,10 +368,10 @@ def damaged_text(rng: random.Random, data: bytes, other: bytes = b"") -> bytes:
     return text.encode(encoding, "replace")
 
 
-def damaged_table(rng: random.Random, data: bytes, other: bytes = b"") -> bytes:
+def in_table(rng: random.Random, data: bytes, other: bytes = b"") -> bytes:
     """Return a table of text with cells, rows, separators, quotes or bytes changed."""
     if rng.random() < 0.35:
-        return rng.choice((damage_bytes, damage_bytes, damaged_text))(rng, data, other)
+        return rng.choice((in_bytes, in_bytes, in_text))(rng, data, other)
     rows = [line.split(",") for line in data.decode("utf-8", "replace").splitlines()] or [[""]]
     rows = [row if isinstance(row, list) else [row] for row in change_nodes(rng, rows, ODD_CELLS)]
     separator = rng.choice((",", ",", ",", ", ", ";", "\t", " ", "   ", " \t", "|", ",,", "\x00"))
@@ -383,18 +381,18 @@ def damaged_table(rng: random.Random, data: bytes, other: bytes = b"") -> bytes:
     return text.encode(rng.choice(("utf-8", "utf-8", "utf-8", "latin-1", "utf-16")), "replace")
 
 
-def damaged_gzip(rng: random.Random, data: bytes, other: bytes = b"") -> bytes:
+def in_gzip(rng: random.Random, data: bytes, other: bytes = b"") -> bytes:
     """Return a compressed table damaged in its text or its bytes, or one that unpacks to 400 MB."""
     try:
         plain = gzip.decompress(data)
     except Exception:
-        return damage_bytes(rng, data, other)
+        return in_bytes(rng, data, other)
     if rng.random() < 0.02:
         return gzip.compress(bytes(400_000_000), compresslevel=1)
-    return gzip.compress(damaged_table(rng, plain)) if rng.random() < 0.5 else damage_bytes(rng, data, other)
+    return gzip.compress(in_table(rng, plain)) if rng.random() < 0.5 else in_bytes(rng, data, other)
 
 
-def damaged_setting(rng: random.Random, data: bytes, other: bytes = b"") -> bytes:
+def in_setting(rng: random.Random, data: bytes, other: bytes = b"") -> bytes:
     """Return the setting of an effect, `name:parameter=value,…`, with odd values, twice, or other bytes."""
     text = data.decode("utf-8", "replace")
     odd = ("nan", "inf", "-inf", "-1", "1e308", "1e-300", "0", "0x1", "1_0", "", "x", "=", "1,1", "1e999")
@@ -407,4 +405,4 @@ def damaged_setting(rng: random.Random, data: bytes, other: bytes = b"") -> byte
         return "=".join(parts).encode()
     if kind == 1:
         return (text + "," + text.partition(":")[2]).encode()
-    return damage_bytes(rng, data, other)
+    return in_bytes(rng, data, other)

@@ -5,14 +5,13 @@ that brought a new answer, and damages it further: a cheap stand-in for the cove
 the code behind the first check.
 """
 
-from __future__ import annotations
-
 import gzip
+import io
 import json
 import random
 import re
 import signal
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path
@@ -20,23 +19,12 @@ from tempfile import TemporaryDirectory
 from types import FrameType
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+from scipy.io import savemat
 
-from bench.inputs.damage import (
-    Damage,
-    bag_of_views,
-    damage_bytes,
-    damaged_gzip,
-    damaged_json,
-    damaged_mcap,
-    damaged_npz,
-    damaged_parquet,
-    damaged_setting,
-    damaged_sqlite,
-    damaged_table,
-    damaged_yaml,
-)
+from bench.inputs import damage
 from bench.inputs.outcome import REFUSED, RESULT, RIG, WALL, Outcome, Play, Work, call, failed, limit_child
-from bench.inputs.tables import CSV, LISTED, MAPS, STRUCTS, play_import, tables_as
 from msg_adapters import iterate, read_record, write_record
 from rsea_ros.cli.simulate import parse_effect
 from rsea_ros.design.motor_gear_units import catalogue
@@ -53,13 +41,86 @@ EVERY = 8
 """One in this many files goes on into a verb that computes with it."""
 
 
+CSV = "t,phi,i,load\n" + "".join(f"{k / 100:.2f},{k % 7},{k % 11 - 5},{k}\n" for k in range(60))
+MAP = """about: a bench
+time: {column: t, unit: s}
+where: {column: load, below: 50}
+channels:
+  position: {column: phi, unit: deg, sign: -1}
+  command: [{column: i, unit: mA, scale: 6.8}, {column: load, unit: N m, constant: 0.5}]
+"""
+RATED = """delimiter: ","
+time: {rate: 100}
+where: {column: load, from: 3}
+channels: {velocity: {column: phi, unit: rpm}, position: [{column: i, unit: mrad, scale: 1, constant: 0}]}
+"""
+EXPRESSED = """header: true
+time: {expression: "t + 0 * i", unit: s}
+runs: {column: load}
+channels:
+  position: {expression: "derivative(clip(phi, -3, 3)) * column('i') ** 2", unit: deg}
+"""
+LISTED = """time: {column: t, unit: s}
+channels:
+  position: {column: "q[1]", unit: deg}
+  command: {expression: "i * column('q[0]')", unit: mA, scale: 3}
+"""
+STRUCTS = """time: {column: log.t, unit: s}
+channels: {position: {column: "log.q(:,2)", unit: deg}, command: {column: log.i, unit: mA, scale: 3}}
+"""
+MAPS = (MAP, RATED, EXPRESSED)
+
+
+def play_import(file_name: str, of_file: str = MAP, *, is_map: bool = False) -> Play:
+    """Return the reader of a table with a map. is_map: the damaged file is the map."""
+
+    def play(folder: Path, data: bytes, number: int) -> Outcome:
+        table, maps = folder / file_name, folder / "map.yaml"
+        table.write_bytes(CSV.encode() if is_map else data)
+        maps.write_bytes(data if is_map else of_file.encode())
+        return call(["import", str(table), "--map", str(maps), "--out", str(folder / f"bag{number}.mcap")])
+
+    return play
+
+
+def tables_as(kind: str) -> list[bytes]:
+    """Return the table as files of a kind, in its variants; all but `mat` have q, a matrix of two columns."""
+    rows = np.array([[float(c) for c in line.split(",")] for line in CSV.splitlines()[1:]])
+    plain = dict(zip(("t", "phi", "i", "load"), rows.T, strict=True))
+    columns = plain | {"q": rows[:, 1:3]}
+    texts = {name: y.tolist() for name, y in columns.items()}
+    if kind == "json":
+        records = [dict(zip(texts, row, strict=True)) for row in zip(*texts.values(), strict=True)]
+        return [json.dumps(texts).encode(), json.dumps(records).encode()]
+    table = pa.table({name: pa.array(list(y)) for name, y in columns.items()})
+    whole = {"log": {**columns, "notes": "a bench"}, "spare": np.zeros(3)}
+    writers: Mapping[str, Sequence[Callable[[io.BytesIO], object]]] = {
+        "npz": [lambda f: np.savez(f, **columns), lambda f: np.savez_compressed(f, **columns)],
+        "mat": [
+            lambda f: savemat(f, plain), lambda f: savemat(f, plain, do_compression=True),
+            lambda f: savemat(f, plain, format="4"),
+        ],
+        "struct": [lambda f: savemat(f, whole)],
+        "parquet": [
+            lambda f, codec=codec: pq.write_table(table, f, row_group_size=20, compression=codec)
+            for codec in ("snappy", "none")
+        ],
+    }  # fmt: skip
+    files = []
+    for write in writers[kind]:
+        buffer = io.BytesIO()
+        write(buffer)
+        files.append(buffer.getvalue())
+    return files
+
+
 @dataclass(frozen=True)
 class Format:
-    """name; seeds: well-formed files; damage: makes another of one; play: reads it, in a folder."""
+    """name; seeds: well-formed files; spoil: makes another of one; play: reads it, in a folder."""
 
     name: str
     seeds: Callable[[], Sequence[bytes]]
-    damage: Damage
+    spoil: damage.Damage
     play: Play
 
 
@@ -182,27 +243,28 @@ def _files(folder: Path, pattern: str) -> list[bytes]:
 
 
 FORMATS = (
-    Format("mcap", lambda: [_bag("bag.mcap")], damaged_mcap, read("bag.mcap", *BAG_READERS, verb=_bag_verb)),
-    Format("sqlite", lambda: [*[_bag("bag.db3")] * 30, bag_of_views(_bag("bag.db3"))], damaged_sqlite,
-           read("bag.db3", *BAG_READERS, verb=_bag_verb)),
-    Format("metadata", lambda: [_bag("bag", "metadata.yaml")], damaged_yaml, _play_metadata),
-    Format("rig", lambda: _files(rig_folders()[0], "*.yaml"), damaged_yaml,
+    Format("mcap", lambda: [_bag("bag.mcap")], damage.in_mcap,
+           read("bag.mcap", *BAG_READERS, verb=_bag_verb)),
+    Format("sqlite", lambda: [*[_bag("bag.db3")] * 30, damage.bag_of_views(_bag("bag.db3"))],
+           damage.in_sqlite, read("bag.db3", *BAG_READERS, verb=_bag_verb)),
+    Format("metadata", lambda: [_bag("bag", "metadata.yaml")], damage.in_yaml, _play_metadata),
+    Format("rig", lambda: _files(rig_folders()[0], "*.yaml"), damage.in_yaml,
            read("rig.yaml", load_rig, verb=_rig_verb, often=True)),
-    Format("map", lambda: list(map(str.encode, MAPS)), damaged_yaml, play_import("run.csv", is_map=True)),
-    Format("structs.mat", lambda: tables_as("struct"), damage_bytes, play_import("run.mat", STRUCTS)),
-    Format("npz", lambda: tables_as("npz"), damaged_npz, play_import("run.npz", LISTED)),
-    Format("parquet", lambda: tables_as("parquet"), damaged_parquet, play_import("run.parquet", LISTED)),
-    Format("json.table", lambda: tables_as("json"), damaged_json, play_import("run.json", LISTED)),
-    Format("csv", lambda: [CSV.encode()], damaged_table, play_import("run.csv")),
-    Format("tsv", lambda: [CSV.replace(",", "\t").encode()], damaged_table, play_import("run.tsv")),
-    Format("csv.gz", lambda: [gzip.compress(CSV.encode())], damaged_gzip, play_import("run.csv.gz")),
-    Format("mat", lambda: tables_as("mat"), damage_bytes, play_import("run.mat")),
+    Format("map", lambda: list(map(str.encode, MAPS)), damage.in_yaml, play_import("run.csv", is_map=True)),
+    Format("structs.mat", lambda: tables_as("struct"), damage.in_bytes, play_import("run.mat", STRUCTS)),
+    Format("npz", lambda: tables_as("npz"), damage.in_npz, play_import("run.npz", LISTED)),
+    Format("parquet", lambda: tables_as("parquet"), damage.in_parquet, play_import("run.parquet", LISTED)),
+    Format("json.table", lambda: tables_as("json"), damage.in_json, play_import("run.json", LISTED)),
+    Format("csv", lambda: [CSV.encode()], damage.in_table, play_import("run.csv")),
+    Format("tsv", lambda: [CSV.replace(",", "\t").encode()], damage.in_table, play_import("run.tsv")),
+    Format("csv.gz", lambda: [gzip.compress(CSV.encode())], damage.in_gzip, play_import("run.csv.gz")),
+    Format("mat", lambda: tables_as("mat"), damage.in_bytes, play_import("run.mat")),
     Format("catalogue", lambda: _files(rig_folders()[0].parent / "design", "motor_gear_units.yaml"),
-           damaged_yaml, read("units.yaml", catalogue, verb=_units_verb)),
-    Format("calibration", lambda: [PAGE, BOMB], damage_bytes, read("page.xml", _page)),
-    Format("json", lambda: [NOISE], damaged_json,
+           damage.in_yaml, read("units.yaml", catalogue, verb=_units_verb)),
+    Format("calibration", lambda: [PAGE, BOMB], damage.in_bytes, read("page.xml", _page)),
+    Format("json", lambda: [NOISE], damage.in_json,
            read("identification.json", lambda file: noise_from(load_rig(RIG), str(file)))),
-    Format("effect", lambda: [_setting(name) for name in effects()], damaged_setting, _play_setting),
+    Format("effect", lambda: [_setting(name) for name in effects()], damage.in_setting, _play_setting),
 )  # fmt: skip
 SHARES = {"mcap": 5, "sqlite": 3, "metadata": 2, "rig": 5, "map": 3, "csv": 3, "mat": 3}
 """Parts of all files; one part for a format that is not named here."""
@@ -226,7 +288,7 @@ def _read_batch(
         kept = list(answers.values())
         base = rng.choice(kept) if kept and rng.random() < 0.5 else rng.choice(seeds)
         sound = number < len(seeds) and seed % 7 == 0
-        data = base if sound else form.damage(rng, base, rng.choice(seeds))
+        data = base if sound else form.spoil(rng, base, rng.choice(seeds))
         name = f"{form.name} {seed} {number}"
         copy = (keep or folder) / name.replace(" ", "-")
         yield name, partial(_read, form, folder, data, number, answers, copy)

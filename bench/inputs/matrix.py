@@ -1,7 +1,5 @@
 """The matrix: every rig, every verb, every subset of channels, and pairs of values of all other factors."""
 
-from __future__ import annotations
-
 import random
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
@@ -11,7 +9,6 @@ from typing import Any
 
 from bench.inputs.bags import CHANNELS, COMMANDS, SENSORS, STAMPS, bag_of
 from bench.inputs.outcome import Outcome, Work, call, limit_child
-from rsea_ros.cli.main import verbs
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.identification.excitation import KINDS
 from rsea_ros.model.rig_file import load_rig, rig_folders
@@ -27,47 +24,35 @@ ROUND_FIGURES = 1_700_000_000_000_000_000
 """ns, an epoch as a recorder has it."""
 
 
-def rigs() -> list[str]:
-    """Return the names of all rigs of config/rigs."""
-    return sorted({f.stem for folder in rig_folders() for f in folder.glob("*.yaml")})
-
-
-def bag_factors(names: Sequence[str]) -> dict[str, list[Any]]:
-    """Return the factors that vary from bag to bag; common values stand several times."""
-    return {
-        "rig": list(names),
-        "verb": [v for v in BAG_VERBS if v in verbs()],
-        "channels": list(SUBSETS),
-        "sensors": ["stated", "stated", "zero", "left out", "mixed"],
-        "noise": [True, True, False],
-        "bench": ["as stated", "misfit"],
-        "rate": [280.0] * 15 + [1.0, 5.0, 50.0, 1000.0, 2000.0],
-        "states": [1.0] * 6 + [0.2, 0.9, 4.0],
-        "duration": [5.0] * 6 + [12.0] * 12 + [30.0] * 3 + [2.0, 90.0, 600.0],
-        "command": [*COMMANDS, "white_noise", "chirp", "white_noise"],
-        "stamps": [*STAMPS, *["even"] * 12],
-        "dead": [*SENSORS, *["none"] * 16],
-        "loop": [False, True],
-        "json": [False, True],
-        "epoch": [FIRST, ROUND_FIGURES],
-        "storage": [".mcap", ".mcap", "", ".db3"],
-    }
+RIGS = sorted({f.stem for folder in rig_folders() for f in folder.glob("*.yaml")})
+FACTORS: dict[str, list[Any]] = {
+    "rig": RIGS, "verb": list(BAG_VERBS), "channels": list(SUBSETS),
+    "sensors": ["stated", "stated", "zero", "left out", "mixed"],
+    "noise": [True, True, False],
+    "bench": ["as stated", "misfit"],
+    "rate": [280.0] * 15 + [1.0, 5.0, 50.0, 1000.0, 2000.0],
+    "states": [1.0] * 6 + [0.2, 0.9, 4.0],
+    "duration": [5.0] * 6 + [12.0] * 12 + [30.0] * 3 + [2.0, 90.0, 600.0],
+    "command": [*COMMANDS, "white_noise", "chirp", "white_noise"],
+    "stamps": [*STAMPS, *["even"] * 12],
+    "dead": [*SENSORS, *["none"] * 16],
+    "loop": [False, True], "json": [False, True], "epoch": [FIRST, ROUND_FIGURES],
+    "storage": [".mcap", ".mcap", "", ".db3"],
+}  # fmt: skip
+"""What varies from bag to bag; common values stand several times."""
 
 
 def bag_cases(seed: int, quick: bool) -> tuple[list[Case], str]:
     """Return the cases that play a bag, and a sentence on what they cover."""
     rng = random.Random(seed)
-    factors = bag_factors(rigs())
     whole = {"stamps": "even", "dead": "none"}
-    rigid = {name for name in factors["rig"] if load_rig(name).rigid_spring}
-    triples = (
-        (r, v, c)
-        for r, v, c in product(factors["rig"], factors["verb"], SUBSETS)
+    rigid = {name for name in RIGS if load_rig(name).rigid_spring}
+    must = [
+        {"rig": r, "verb": v, "channels": c, **whole} for r, v, c in product(RIGS, BAG_VERBS, SUBSETS)
         if not (r in rigid and "deflection" in c)
-    )
-    must = [{"rig": r, "verb": v, "channels": c, **whole} for r, v, c in triples]
-    cases, pairs = cover_pairs(factors, rng, must)
-    said = f"each of {len(must)} rigs × verbs × subsets of channels; {pairs} pairs of {len(factors)} factors"
+    ]  # fmt: skip
+    cases, pairs = cover_pairs(FACTORS, rng, must)
+    said = f"each of {len(must)} rigs × verbs × subsets of channels; {pairs} pairs of {len(FACTORS)} factors"
     rng.shuffle(cases)
     if quick:
         cases = [c for c in cases if c["duration"] <= 12.0 and c["rate"] <= 280.0][:60]
@@ -103,17 +88,16 @@ def play_bag(case: Case, folder: Path) -> Outcome:
 def other_cases(seed: int, quick: bool) -> list[Case]:
     """Return the cases of the verbs that take a rig, numbers, or a table."""
     rng = random.Random(seed)
-    names = rigs()
     simulate = cover_pairs(
-        {"rig": names, "verb": ["simulate"], "excitation": sorted(KINDS),
+        {"rig": RIGS, "verb": ["simulate"], "excitation": sorted(KINDS),
          "rate": [280.0, 1.0, 10.0, 1000.0, 2000.0],
          "duration": [10.0, 2.0, 0.001, 60.0], "effect": [None, *catalogue()],
          "amplitude": [20.0, 0.0, -5.0, 1e-300],
          "period": [4.0, 0.001, 10.0, 1e9], "low": [0.05, 1e-9, 100.0], "high": [100.0, 1e-3, 1e9],
          "no_noise": [False, True]}, rng)[0]  # fmt: skip
-    control = cover_pairs({"verb": ["control"], "rig": names, "rate": [280.0, 1000.0, 50.0, 2000.0, 10000.0],
-                        "free": [None, *names]}, rng)[0]  # fmt: skip
-    export = [{"verb": "export", "rig": r} for r in names]
+    control = cover_pairs({"verb": ["control"], "rig": RIGS, "rate": [280.0, 1000.0, 50.0, 2000.0, 10000.0],
+                        "free": [None, *RIGS]}, rng)[0]  # fmt: skip
+    export = [{"verb": "export", "rig": r} for r in RIGS]
     odd = [1e-300, 1e-3, 1.0, 1e3, 1e300, 0.0, -1.0, "nan", "inf"]
     options = ("torque", "bandwidth", "inertia", "mass", "diameter", "separation", "spring-radius",
                "deflection", "tolerance-db", "tolerance-deg", "stiffness")  # fmt: skip

@@ -3,8 +3,6 @@
 This process has run every verb once and forks once for each piece of work.
 """
 
-from __future__ import annotations
-
 import contextlib
 import importlib
 import json

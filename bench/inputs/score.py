@@ -4,8 +4,6 @@ matrix: every rig, verb and subset of channels, pairwise rates, lengths, command
 mutations: damaged files of every format that is read. The promise: a result, or status 2 and one line.
 """
 
-from __future__ import annotations
-
 import math
 import re
 import sys

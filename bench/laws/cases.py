@@ -5,8 +5,6 @@ only judges. Catalogue effects and the laws written here are simulated by the st
 are not the rig's; the others by the second bench of the tests, which shares no code with the model.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from independent.bench import drawn_bench, record_run
 from independent.excitations import chirp_noise, odd_multisine
+from independent.hidden import BESIDE_THE_CONTRACT, hide_beside_the_contract
 
 from rsea_ros.effects import signal_table as st
 from rsea_ros.effects.catalogue import catalogue, lend
@@ -31,7 +30,10 @@ _CLAIMS = Claims("velocity", "neither", None)
 
 @dataclass(frozen=True)
 class LawCase:
-    """A hidden law. effect: the true effect, fitted for comparison. right: the right regressors."""
+    """A hidden law. effect: the true effect, fitted for comparison. right: the right regressors.
+
+    second: whether the second bench plays it.
+    """
 
     name: str
     group: str
@@ -39,14 +41,15 @@ class LawCase:
     parameters: Mapping[str, float]
     right: tuple[str, ...]
     rig: str = RIG
-    values: Mapping[str, float] | None = None
+    second: bool = False
     seed: int = 1
 
     def records(self, duration: float) -> tuple[Record, Record]:
         """Return a record to learn from and one that judges."""
         seeds = (10 * self.seed, 10 * self.seed + 1)
-        if self.values is not None:
-            bench = drawn_bench(np.random.default_rng(self.seed)).with_values(**self.values)
+        if self.second:
+            bench = drawn_bench(np.random.default_rng(self.seed))
+            bench = hide_beside_the_contract(bench, self.effect.name) if self.effect else bench
             kinds = zip(seeds, ("chirp_noise", "multisine"), strict=True)
             first, second = (record_run(bench, seed, kind, duration) for seed, kind in kinds)
             return first, second
@@ -168,17 +171,8 @@ WRITTEN = (
 )  # fmt: skip
 """Laws that no file of the catalogue has: the effect, and the regressors that are right."""
 
-OUTSIDE = {
-    "dead_band": ({"deadband": 4.0}, "dead_zone", {"width": 4.0, "jump": 1.0}, ("command",)),
-    "lugre": ({"lugre_coulomb": 2.0, "bristle_k": 2500.0, "lugre_stribeck": 1.0, "stribeck_v": 0.03,
-               "bristle_b": 5.0}, "lugre_friction",
-              {"coulomb_torque": 2.0, "bristle_stiffness": 2500.0, "stribeck_torque": 1.0,
-               "stribeck_velocity": 0.03, "bristle_damping": 5.0}, ("speed", "position's past")),
-    "eccentric_encoder": ({"eccentricity": 8e-5, "eccentricity_cycles": 1.0}, "encoder_eccentricity",
-                          {"amplitude": 8e-5, "cycles_per_revolution": 1.0, "phase": 0.0},
-                          ("position, periodic, at the encoder",)),
-}  # fmt: skip
-"""Laws of the second bench: its values, the catalogue's effect that comes nearest, the right regressors."""
+OUTSIDE = {"dead_band": "dead_zone", "lugre": "lugre_friction", "eccentric_encoder": "encoder_eccentricity"}
+"""Laws that the second bench plays: the catalogue's effect that comes nearest."""
 
 
 def cases(clean: int) -> list[LawCase]:
@@ -191,9 +185,10 @@ def cases(clean: int) -> list[LawCase]:
     made += [
         LawCase(e.name, "unknown", e, e.typical, right, seed=71 + k) for k, (e, right) in enumerate(WRITTEN)
     ]
-    for k, (name, (values, near, parameters, right)) in enumerate(OUTSIDE.items()):
-        made.append(LawCase(name, "unknown", catalogue()[near], parameters, right, RIG, values, 91 + k))
+    for k, (name, near) in enumerate(OUTSIDE.items()):
+        effect, (known, _) = catalogue()[near], BESIDE_THE_CONTRACT[near]
+        sizes = {p.name: known.get(p.name, 0.0) for p in effect.parameters}
+        made.append(LawCase(name, "unknown", effect, sizes, RIGHT[near], RIG, True, 91 + k))
     for k in range(clean):
-        outside = k % 2 == 0
-        made.append(LawCase(f"clean-{k}", "clean", None, {}, (), RIG, {} if outside else None, 200 + k))
+        made.append(LawCase(f"clean-{k}", "clean", None, {}, (), RIG, k % 2 == 0, 200 + k))
     return made

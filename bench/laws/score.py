@@ -10,8 +10,6 @@ A run that is stopped goes on where its log ends. gain: 1 - RMS(with) / RMS(with
 channels in units of what the base leaves of them.
 """
 
-from __future__ import annotations
-
 import time
 import traceback
 from collections.abc import Iterator, Mapping, Sequence

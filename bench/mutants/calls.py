@@ -4,8 +4,6 @@ The notes are kept in out/mutant-calls.txt, which you delete after a change of t
 noted by nobody: its module's and its importers' tests play it.
 """
 
-from __future__ import annotations
-
 import ast
 import os
 import subprocess
@@ -19,10 +17,24 @@ from pathlib import Path
 from typing import NamedTuple
 
 from bench import ROOT
-from bench.mutants.run import FIRST
 
 NOTES = ROOT / "out" / "mutant-calls.txt"
 RECORDER = Path(__file__).with_name("recorder.py")
+FIRST = """
+import os
+import subprocess
+
+begin = subprocess.Popen.__init__
+
+def init(self, *args, env=None, **options):
+    env = dict(os.environ if env is None else env)
+    env["PYTHONPATH"] = os.pathsep.join(filter(None, [{folder!r}, env.get("PYTHONPATH")]))
+    begin(self, *args, env=env, **options)
+
+subprocess.Popen.__init__ = init
+"""
+"""As sitecustomize.py of a folder Python runs it first in every process, also where a test states its own
+environment."""
 LOADING = """
 import sys
 from importlib.util import module_from_spec, spec_from_file_location

@@ -6,8 +6,6 @@ fixture of another file, and what runs while a module is imported: for whatever 
 PYTEST_DONT_REWRITE: it is loaded before pytest is.
 """
 
-from __future__ import annotations
-
 import os
 import resource
 import sys

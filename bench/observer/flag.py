@@ -1,8 +1,5 @@
-"""The pure-torque flag: false alarms on noise, and its verdict against the true error over signals."""
+"""The pure-torque flag: its verdict against the true error over signals."""
 
-from __future__ import annotations
-
-import time
 from collections.abc import Iterator, Mapping
 
 import numpy as np
@@ -14,13 +11,9 @@ from rsea_ros.model.observer import Observer, TorqueEstimate, observe
 from rsea_ros.model.pure_torque_error import BEYOND, PURE, ErrorFlag, ErrorSettings
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.model.simulation import measure, synthesize
-from rsea_ros.model.torque_band import TorqueBand
 from rsea_ros.model.transfer import end_to_end, frequency_response
-from rsea_ros.nodes.model import CHANGED, EVERY
-from rsea_ros.records.record import Channel, FloatArray
+from rsea_ros.records.record import FloatArray
 
-CHUNK = 280 * 600
 BAND = 0.2
 """Part of the tolerance, either way, within which the flag may say either."""
 SECONDS, SETTLE = 10.0, 1.5
@@ -33,46 +26,6 @@ OTHERS = {
     "J_m + 25 %": {"rotor.reflected_inertia": 1.191},
 }
 """Possible benches, while the model is that of Table 2."""
-
-
-def noise(*, hours: float = 10.0) -> Iterator[Row]:
-    """Count false alarms on noise alone, and changes beside a small torque in the band."""
-    rig = load_rig("paper_high_impedance")
-    begin, alarms, rng = time.monotonic(), 0, np.random.default_rng(0)
-    observer, band = Observer(rig), TorqueBand(rig)
-    chunks = round(hours * 3600.0 * 280.0 / CHUNK)
-    for chunk in range(chunks):
-        still = np.zeros(CHUNK)
-        channels = [measure(rig, n, still, rng) for n in ("position", "motor_torque", "ft")]
-        alarms += _changes(observer, band, chunk * CHUNK, *channels)
-    spent, simulated = time.monotonic() - begin, chunks * CHUNK / 280.0
-    told = f"{alarms} false alarms, {simulated / spent:.0f} times faster than real time"
-    yield Row(f"noise alone, {simulated / 3600.0:g} h", "< 1 an hour", told)
-    for amplitude in (0.05, 0.2, 1.0):
-        t = np.arange(CHUNK) / 280.0
-        record = synthesize(rig, Channel(t, amplitude * np.sin(2.0 * np.pi * 1.0 * t)), seed=1)
-        channels = [record[n].y for n in ("position", "motor_torque", "ft")]
-        changes = _changes(Observer(rig), TorqueBand(rig), 0, *channels)
-        yield Row(f"1 Hz, {amplitude:g} N·m, ten minutes", "", f"{changes} times heard or lost")
-
-
-def _changes(observer: Observer, band: TorqueBand, first: int, position: FloatArray, torque: FloatArray,
-             ft: FloatArray) -> int:  # fmt: skip
-    """Return how often a torque was heard or lost after 1 s; measured torque stands for the command.
-
-    The band learns the noise once that has changed, as in the node.
-    """
-    changes, was, known = 0, False, 0.0
-    for k, (q, u, y) in enumerate(zip(position.tolist(), torque.tolist(), ft.tolist(), strict=True), first):
-        observer.state(k / 280.0, q, u)
-        estimate = observer.ft(k / 280.0, y)
-        assert estimate is not None
-        heard = band.take(k / 280.0, estimate)
-        changes, was = changes + (heard != was and k > 280), heard
-        if k % EVERY == 0 and abs(estimate.sigma_distal - known) > CHANGED * known:
-            known = estimate.sigma_distal
-            band.calibrate(observer.error_model(1.0 / 280.0), 1.0 / 280.0)
-    return changes
 
 
 def flag() -> Iterator[Row | str]:

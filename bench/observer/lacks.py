@@ -1,20 +1,18 @@
 """The observer on plants of another hand, which its model lacks something of: Runge-Kutta at 50 kHz.
 
-Own equations of the paper's bench (housing h, gear output g, chassis c behind the play; rotor as an inerter
-between h and g), clamped or with a free housing, and of an actuator 95 times lighter. No code of the
-project's simulation or effects.
+The equations of test/independent, clamped or with a free housing, with the values of the paper's bench and of
+an actuator 95 times lighter. No code of the project's simulation or effects.
 """
 
-from __future__ import annotations
-
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from independent.equations import DG, DH, G, H, sensor_torques
+from independent.plant import Plant
+from independent.solvers import run_fixed
 
 from bench.results import Row
-from rsea_ros.compiler import njit
 from rsea_ros.model.observer import Observer, observe
 from rsea_ros.model.observer.assemble import NOTHING
 from rsea_ros.model.rig import Rig
@@ -25,44 +23,6 @@ SETTLE = 0.5
 TEETH, LOSS, CREEP = 4e5, 60.0, 2e-3
 """Of K_s = 1530 N m/rad, scaled with it: stiffness and damping of the teeth in contact; rad/s at which dry
 friction is three quarters of itself."""
-
-
-@njit(cache=True, nogil=True)
-def integrate(u, every, dt, p, out):  # type: ignore[no-untyped-def]
-    """Put gear angle against housing, spring torque, torque on the housing's end and friction at the end of
-    each command (N m, held for `every` steps of dt s) into out, shape (n, 4)."""
-    n, jr, jh, jc, b, k, d, gap, dry, kh, bh, free, teeth = p
-    y, k1, k2, k3, k4, at = np.zeros(6), np.zeros(6), np.zeros(6), np.zeros(6), np.zeros(6), np.zeros(6)
-    for s in range(len(u)):
-        for step in range(every + 1):
-            stages = ((k1, k1, 0.0), (k2, k1, 0.5), (k3, k2, 0.5), (k4, k3, 1.0))
-            for stage, (slope, before, part) in enumerate(stages):
-                for i in range(6):
-                    at[i] = y[i] + part * dt * before[i]
-                h, g, c, vh, vg, vc = at
-                rubbed = dry * math.tanh((vg - vh) / CREEP)
-                drive = u[s] - b * (vg - vh) - rubbed
-                spring, e, hit = k * c + d * vc, g - c, 0.0
-                if e > gap / 2:
-                    hit = max(0.0, teeth * (e - gap / 2 + LOSS / TEETH * (vg - vc)))
-                elif e < -gap / 2:
-                    hit = min(0.0, teeth * (e + gap / 2 + LOSS / TEETH * (vg - vc)))
-                load, inertia = (hit, jr * n * n) if gap > 0.0 else (spring, jr * n * n + jc)
-                ah, ag = 0.0, (drive - load) / inertia
-                if free > 0.0:
-                    held, cross = kh * h + bh * vh, jr * n * (1.0 - n)
-                    own = jh + jr * (1.0 - n) ** 2
-                    det = own * inertia - cross * cross
-                    ah = (inertia * (-drive - held) - cross * (drive - load)) / det
-                    ag = (own * (drive - load) - cross * (-drive - held)) / det
-                ac = (hit - spring) / jc if gap > 0.0 else ag
-                slope[0], slope[1], slope[2], slope[3], slope[4], slope[5] = vh, vg, vc, ah, ag, ac
-                if step == every and stage == 0:
-                    out[s, 0], out[s, 1], out[s, 3] = g - h, spring, -rubbed
-                    out[s, 2] = -(jh * ah + bh * vh + kh * h) if free > 0.0 else np.nan
-            if step < every:
-                for i in range(6):
-                    y[i] += dt / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i])
 
 
 @dataclass(frozen=True)
@@ -109,22 +69,27 @@ def played(rig: Rig, command: FloatArray, rate: float, seed: int, values: Mappin
     """Return a run of a plant. values: factors on the rig's; play: rad; friction: N m; noise: factor on that
     of the F/T sensor; zero: its zero, in sigmas of its noise."""
     r = rig.with_values({name: factor * rig[name] for name, factor in values.items()})
-    free, n = r.end_is_free("housing_end"), r["gear.ratio"]
-    housing = [r[f"housing_end.{name}"] if free else 1.0 for name in ("inertia", "stiffness", "damping")]
-    every = round(5e4 / rate)
-    p = (n, r["rotor.reflected_inertia"] / n**2, housing[0], r["chassis.inertia"],
-         r["rotor.reflected_damping"], r["spring.stiffness"], r["spring.damping"], play, friction,
-         *housing[1:], float(free), TEETH / 1530.0 * r["spring.stiffness"])  # fmt: skip
-    out, t, rng = np.zeros((len(command), 4)), np.arange(len(command)) / rate, np.random.default_rng(seed)
-    integrate(command, every, 1.0 / rate / every, p, out)
+    teeth = TEETH / 1530.0 * r["spring.stiffness"]
+    plant = Plant(
+        j_m=r["rotor.reflected_inertia"], b_m=r["rotor.reflected_damping"], k_s=r["spring.stiffness"],
+        b_s=r["spring.damping"], j_sc=r["chassis.inertia"], ratio=r["gear.ratio"], gap=play, contact_k=teeth,
+        contact_b=teeth * LOSS / TEETH, coulomb=friction, v_0=CREEP,
+    )  # fmt: skip
+    if r.end_is_free("housing_end"):
+        inertia, stiffness, damping = (r[f"housing_end.{n}"] for n in ("inertia", "stiffness", "damping"))
+        plant = plant._replace(housing_free=1.0, j_h=inertia, k_h=stiffness, b_h=damping)
+    t, rng = np.arange(len(command)) / rate, np.random.default_rng(seed)
+    states, _ = run_fixed(command, np.zeros(len(t)), 1.0 / rate, plant, round(5e4 / rate))
+    torque = sensor_torques(t + 1.0 / rate, states, plant)
     measured = {}
-    for name, true in (("position", out[:, 0]), ("motor_torque", command), ("ft", out[:, 1])):
+    for name, true in (("position", states[:, G] - states[:, H]), ("motor_torque", command), ("ft", torque)):
         sensor = rig.sensors[name]
         factor, off = (noise, zero) if name == "ft" else (1.0, 0.0)
         y = true + sensor.noise * (factor * rng.standard_normal(len(t)) + off)
         y = np.round(y / sensor.quantum) * sensor.quantum if sensor.quantum else y
         measured[name] = Channel(t + 1.0 / rate, y)
-    return Run(Record({"command": Channel(t, command), **measured}, source=rig.name), out[:, 1], out[:, 3])
+    rubbed = -friction * np.tanh((states[:, DG] - states[:, DH]) / CREEP)
+    return Run(Record({"command": Channel(t, command), **measured}, source=rig.name), torque, rubbed)
 
 
 def chirp(rate: float, seconds: float, size: tuple[float, float], seed: int) -> FloatArray:

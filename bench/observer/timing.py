@@ -8,8 +8,6 @@ loop with absolute deadlines.
 caches are warm. After a sleep of a period they are not: that is the machine's share of the node's time.
 """
 
-from __future__ import annotations
-
 import tempfile
 import time
 from collections.abc import Iterator
@@ -48,11 +46,11 @@ def _at(rate: float, priority: int, seconds: float, folder: Path) -> Iterator[Ro
     work = {"kind": "multisine", "amplitude": 8.0, "high": 40.0, "duration": seconds + 60.0}
     with ExitStack() as nodes:
         nodes.enter_context(run_node("plant", priority=priority and priority + 1, folder=folder, rate=rate))
-        model = nodes.enter_context(run_node("observer/node", folder=folder, realtime_priority=priority))
+        model = nodes.enter_context(run_node("model", folder=folder, noted=True, realtime_priority=priority))
         nodes.enter_context(run_node("excite", folder=folder, rate=rate, **work))
         topics = {"torque_estimate": (JointState, COMMAND), "ft": (WrenchStamped, MEASUREMENT)}
         delays, bare, cpu = beside_bare_loop(model.pid, topics, rate, seconds, folder, priority)
-    rows = np.load(folder / "observer-node.npy")
+    rows = np.load(folder / "model.npy")
     rows = rows[(rows[:, 0] > bare[0, 1]) & (rows[:, 0] < bare[-1, 1])]
     setup = f"{rate:g} Hz" + (f", FIFO {priority}: " if priority else ": ")
     yield _line(setup + "observer and flag, µs", "p99 < 60", rows[:, 3] / 1e3)

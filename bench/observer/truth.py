@@ -6,8 +6,6 @@ Means over each of the last two steps before a stamp (0.45 ms at most), drawn on
 effects included. A spring before the housing's end is read instead. Which of the two is T_d, the rig says.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -3,8 +3,6 @@
 Nodes are left out: .ci/run tries them, on GitHub with each version. A missing version counts as untried.
 """
 
-from __future__ import annotations
-
 import platform
 import re
 import subprocess

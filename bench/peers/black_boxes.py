@@ -7,8 +7,6 @@ until the budget is spent. pysindy: sparse regression of the state's derivative 
 STLSQ, simulated; states are position and velocity where they are measured, else the output and its rate.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from common import PeerCase, PeerResult, scale
 

@@ -5,8 +5,6 @@ test/independent, which shares no code with it. `pendulum, BAM's friction` is BA
 very equations that its adapter fits. `black box` is nobody's physics. Silverbox and EMPS are other people's.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path

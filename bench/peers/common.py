@@ -8,8 +8,6 @@ script fits to the samples before `split` and predicts y from there on by a free
 BUDGET: processor seconds. Only numpy is needed, so that every peer's environment has it.
 """
 
-from __future__ import annotations
-
 import importlib
 import json
 import sys

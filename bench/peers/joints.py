@@ -6,8 +6,6 @@ cma_pace: the five values that PACE fits for a joint: armature, viscous and dry 
 Source: leggedrobotics/pace-sim2real. All else, such as the stiffness of a spring, stays as stated.
 """
 
-from __future__ import annotations
-
 import cma
 import numpy as np
 from common import NotApplicable, PeerCase, PeerResult

@@ -5,8 +5,6 @@ results stay in OUT, and only missing ones are run again. What is compared, with
 which settings, and who is at home where: docs/peers.md.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import os

@@ -7,8 +7,6 @@ model.py and simulate.py). The law is implemented here from its equations: the p
 its simulator is made for its own servos and logs. Semi-implicit Euler, PARTS steps a sample.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numba import njit
 

@@ -1,7 +1,5 @@
 """mujoco.sysid: armature, damping, spring, dry friction and weight of a joint, by its own least squares."""
 
-from __future__ import annotations
-
 import mujoco
 import numpy as np
 from common import NotApplicable, PeerCase, PeerResult

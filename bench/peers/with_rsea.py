@@ -3,8 +3,6 @@
 Silverbox has a rig whose effects are stated; there the rig is fitted as in bench/public/score.py.
 """
 
-from __future__ import annotations
-
 import sys
 from dataclasses import replace
 from pathlib import Path

@@ -10,8 +10,6 @@ In its loop, by `identify` and `predict`: the targets are the commands, and noth
     python -m bench public emps       both runs fitted whole, each freely over both: how they differ
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import product

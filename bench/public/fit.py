@@ -4,8 +4,6 @@ The simulation, the effects and the solver are the project's; nothing is fitted 
 numbers of its initial state, and those on the first samples only, which no score counts.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -47,12 +45,8 @@ def record_of(command: FloatArray, position: FloatArray, rate: float) -> Record:
 
 
 def case_of(
-    rig: Rig,
-    record: Record,
-    skip: int,
-    refine: int = REFINE,
-    initial: tuple[float, float] = (0.0, 0.0),
-) -> Case:
+    rig: Rig, record: Record, skip: int, refine: int = REFINE, initial: tuple[float, float] = (0.0, 0.0),
+) -> Case:  # fmt: skip
     """Return a record ready to be fitted to its position.
 
     skip: samples at the start that no residual looks at: the initial state, position and velocity, decays in

@@ -184,7 +184,7 @@ class SizeSettings:
     model_error: float = number(
         0.0025, "1", "relative error of the simulation itself in every size, one sigma",
         "fits to MuJoCo's play of the same bench deviate by 0.10 % RMS, 0.64 % at most "
-        "(python -m bench diagnosis model_doubt); coverage is measured on another bench (test/independent)",
+        "(decision 387); coverage is measured on another bench (test/independent)",
     )  # fmt: skip
     widest: float = number(
         10.0, "1", "ratio of the ends of a size's interval from which a cause is not confirmed",

@@ -14,8 +14,7 @@ import pytest
 import yaml
 
 from bench.__main__ import _parser, _print, index, main as run_bench
-from bench.experiment.policies import Fixed
-from bench.experiment.score import LIMITS
+from bench.experiment.score import LIMITS, Fixed
 from bench.frozen.cases import generated
 from bench.mutants import calls as callers
 from bench.results import read_lines, resumed, write_pages
