@@ -293,8 +293,18 @@ def with_unknown_start(problem: Problem, theta: FloatArray) -> Problem:
     for i, case in enumerate(cases):
         if isinstance(case.drive, Drive):
             _, shown = shown_by_starts(case, [*_other_starts(case.drive, case.noise)], rig, clocks, problem)
-            cases[i] = replace(case, anew={n: (columns, case.mask[n]) for n, columns in shown.items()})
+            told = _apart(np.concatenate([y[case.mask[n]] / case.noise[n] for n, y in shown.items()]))
+            cases[i] = replace(case, anew={n: (y @ told, case.mask[n]) for n, y in shown.items()})
     return replace(problem, cases=tuple(cases))
+
+
+def _apart(columns: FloatArray) -> FloatArray:
+    """Return sums of changes, shape (k, sums), that do different things to a residual, each as much."""
+    size = np.linalg.norm(columns, axis=0)
+    size = np.where(np.isfinite(size) & (size > 0.0), size, np.inf)
+    _, shares, sums = np.linalg.svd(np.nan_to_num(columns / size), full_matrices=False)
+    is_told = shares > _SAME
+    return np.asarray((sums[is_told] / size).T / shares[is_told] / _KNOWN**0.5)
 
 
 def shown_by_starts(
@@ -304,6 +314,10 @@ def shown_by_starts(
     moved = [replace(case, drive=drive, anew={}) for drive in (case.drive, *drives)]
     own, *others = simulate_cases(moved, rig, clocks, on_angle=problem.on_angle)[0]
     return own, {n: np.stack([o[n] - own[n] for o in others], axis=1) for n in problem.present(case)}
+
+
+_SAME = 1e-3
+"""Share of the largest below which two states at the start do the same to the residual."""
 
 
 def _other_starts(drive: Drive, noise: Mapping[str, float]) -> Iterator[Drive]:

@@ -25,14 +25,7 @@ import numpy as np
 from rsea_ros.effects.parameter import STIFFNESS, TORQUE, Scale, scale_to
 from rsea_ros.errors import RseaError
 from rsea_ros.identification.frequency_response import model_response
-from rsea_ros.identification.problem import (
-    APART,
-    OFF,
-    Case,
-    Problem,
-    change_of_starts,
-    shown_by_starts,
-)
+from rsea_ros.identification.problem import APART, OFF, Case, Problem, change_of_starts, shown_by_starts
 from rsea_ros.identification.result import FrequencyResponse
 from rsea_ros.identification.solver import Map, descend, serial, solve
 from rsea_ros.identification.unknowns import Clocks, apply, start_vector, unknowns_of_rig
