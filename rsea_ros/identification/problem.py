@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from types import MappingProxyType
 
 import numpy as np
@@ -11,7 +12,7 @@ import numpy as np
 from rsea_ros.errors import IdentificationError
 from rsea_ros.identification.noise import least_noise, noise_floor
 from rsea_ros.identification.unknowns import Clocks, Unknown, apply
-from rsea_ros.model.drive import Drive, SpringStart, outside_gaps, zero_unknown
+from rsea_ros.model.drive import Drive, outside_gaps, zero_unknown
 from rsea_ros.model.extent import SKIPPED_START
 from rsea_ros.model.inverse import Motion, acting_torque, is_inverse, motion_from, noise_along, torques_along
 from rsea_ros.model.position_loop import with_command
@@ -32,9 +33,9 @@ class Case:
 
     floating: channels whose zero is unknown; they are compared without their means.
     least: by channel its least noise. coloured: channels whose entire residual was
-    taken for noise of the sensor after a fit (noise_level.py). anew: by channel, where states at the start or
-    behind gaps are fitted with each simulation, what a change of each does to it, and which samples tell.
-    filters: known ones, by channel.
+    taken for noise of the sensor after a fit (noise_level.py). filters: known ones, by channel.
+    starts: where states at the start or behind gaps are fitted with each simulation, by channel what a change
+    of each does to it, shape (n, k), and which samples tell.
     """
 
     drive: Drive | Motion
@@ -46,8 +47,14 @@ class Case:
     floating: frozenset[str] = frozenset()
     least: Mapping[str, float] = field(default_factory=dict)
     coloured: frozenset[str] = frozenset()
-    anew: Mapping[str, tuple[FloatArray, BoolArray]] = field(default_factory=dict)
+    starts: Mapping[str, tuple[FloatArray, BoolArray]] = field(default_factory=dict)
     filters: Mapping[str, SensorFilter] = field(default_factory=dict)
+
+    @cached_property
+    def told_starts(self) -> tuple[FloatArray, FloatArray]:
+        """What `starts` does to the samples that tell, over noise, shape (m, k), and its square, (k, k)."""
+        columns = np.concatenate([shows[m] / self.noise[n] for n, (shows, m) in self.starts.items()])
+        return columns, columns.T @ columns + _KNOWN * np.eye(columns.shape[1])
 
     def within(self, mask: Mapping[str, BoolArray]) -> Case:
         """Return the case with only samples that are also in `mask`."""
@@ -59,7 +66,7 @@ class Case:
             self, drive=drive, t={n: t[samples[n]] for n, t in self.t.items()},
             measured={n: y[samples[n]] for n, y in self.measured.items()},
             mask={n: m[samples[n]] for n, m in self.mask.items()},
-            anew={n: (shows[samples[n]], tells[samples[n]]) for n, (shows, tells) in self.anew.items()},
+            starts={n: (shows[samples[n]], tells[samples[n]]) for n, (shows, tells) in self.starts.items()},
         )
 
     def with_noise(self, noise: Mapping[str, float]) -> Case:
@@ -224,7 +231,7 @@ def simulate_cases(
     by_case = [
         [_on_measured_zero(c, torques_along(rigs[name], c.drive))] * len(clocks)
         if isinstance(c.drive, Motion)
-        else [_begun_anew(c, _on_measured_zero(c, outputs)) for outputs in next(simulations[name])]
+        else [_from_fitted_starts(c, _on_measured_zero(c, outputs)) for outputs in next(simulations[name])]
         for c, name in zip(cases, names, strict=True)
     ]
     return [[outputs[k] for outputs in by_case] for k in range(len(clocks))]
@@ -237,30 +244,25 @@ def _on_measured_zero(case: Case, outputs: dict[str, FloatArray]) -> dict[str, F
     return outputs
 
 
-def _begun_anew(case: Case, outputs: dict[str, FloatArray]) -> dict[str, FloatArray]:
-    """Add what the states behind gaps that fit best make of outputs, to first order."""
-    if case.anew:
-        change = change_of_starts(case, outputs)
-        outputs |= {n: outputs[n] + case.anew[n][0] @ change for n in case.anew.keys() & outputs.keys()}
-    return outputs
+def _from_fitted_starts(case: Case, outputs: dict[str, FloatArray]) -> dict[str, FloatArray]:
+    if not case.starts:
+        return outputs
+    change = change_of_starts(case, outputs)
+    return outputs | {n: outputs[n] + shows @ change for n, (shows, _) in case.starts.items()}
 
 
 def change_of_starts(case: Case, outputs: Mapping[str, FloatArray]) -> FloatArray:
-    """Return the changes of the states behind the gaps of a case that fit best, shape (4 gaps,).
-
-    Zero where outputs ran away.
-    """
-    told = [(n, *shown) for n, shown in case.anew.items() if n in outputs]
-    missing = np.concatenate([(case.measured[n] - outputs[n])[m] / case.noise[n] for n, _, m in told])
-    columns = np.concatenate([shows[m] / case.noise[n] for n, shows, m in told])
-    if not (np.isfinite(missing).all() and np.isfinite(columns).all()):
-        return np.zeros(columns.shape[1])
-    square = columns.T @ columns + _KNOWN * np.eye(columns.shape[1])
-    return np.asarray(np.linalg.solve(square, columns.T @ missing))
+    """Return the changes of `starts` with which outputs fit best, shape (k,); zero where they ran away."""
+    columns, square = case.told_starts
+    off = ((case.measured[n] - outputs[n])[m] / case.noise[n] for n, (_, m) in case.starts.items())
+    left = np.concatenate([*off])
+    if not (np.isfinite(left).all() and np.isfinite(square).all()):
+        return np.zeros(len(square))
+    return np.asarray(np.linalg.solve(square, columns.T @ left))
 
 
 _KNOWN = 1e-6
-"""What the sensors say of a state behind a gap is trusted to 1000 times its noise."""
+"""What the sensors say of a state at a start is trusted to 1000 times its noise."""
 
 
 def _instants(drive: Drive, clocks: Clocks) -> Mapping[str, FloatArray]:
@@ -293,12 +295,12 @@ def with_unknown_start(problem: Problem, theta: FloatArray) -> Problem:
     for i, case in enumerate(cases):
         if isinstance(case.drive, Drive):
             _, shown = shown_by_starts(case, [*_other_starts(case.drive, case.noise)], rig, clocks, problem)
-            told = _apart(np.concatenate([y[case.mask[n]] / case.noise[n] for n, y in shown.items()]))
-            cases[i] = replace(case, anew={n: (y @ told, case.mask[n]) for n, y in shown.items()})
+            told = _directions(np.concatenate([y[case.mask[n]] / case.noise[n] for n, y in shown.items()]))
+            cases[i] = replace(case, starts={n: (y @ told, case.mask[n]) for n, y in shown.items()})
     return replace(problem, cases=tuple(cases))
 
 
-def _apart(columns: FloatArray) -> FloatArray:
+def _directions(columns: FloatArray) -> FloatArray:
     """Return sums of changes, shape (k, sums), that do different things to a residual, each as much."""
     size = np.linalg.norm(columns, axis=0)
     size = np.where(np.isfinite(size) & (size > 0.0), size, np.inf)
@@ -311,7 +313,7 @@ def shown_by_starts(
     case: Case, drives: Sequence[Drive], rig: Rig, clocks: Clocks, problem: Problem
 ) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
     """Return by channel the outputs of a case, shape (n,), and what other drives add, shape (n, drives)."""
-    moved = [replace(case, drive=drive, anew={}) for drive in (case.drive, *drives)]
+    moved = [replace(case, drive=drive, starts={}) for drive in (case.drive, *drives)]
     own, *others = simulate_cases(moved, rig, clocks, on_angle=problem.on_angle)[0]
     return own, {n: np.stack([o[n] - own[n] for o in others], axis=1) for n in problem.present(case)}
 
@@ -326,11 +328,10 @@ def _other_starts(drive: Drive, noise: Mapping[str, float]) -> Iterator[Drive]:
     off = noise.get("position", OFF)
     yield replace(drive, initial=(q + off, w))
     yield replace(drive, initial=(q, w + off / APART))
-    if drive.spring is not None:
-        channel, value, rate = drive.spring
-        off = noise[channel]
-        yield replace(drive, spring=SpringStart(channel, value + off, rate))
-        yield replace(drive, spring=SpringStart(channel, value, rate + off / APART))
+    if spring := drive.spring:
+        off = noise[spring.channel]
+        yield replace(drive, spring=spring._replace(value=spring.value + off))
+        yield replace(drive, spring=spring._replace(rate=spring.rate + off / APART))
 
 
 OFF = 1e-4

@@ -216,16 +216,16 @@ def settled_starts(problem: Problem, theta: FloatArray, run: Map = serial) -> tu
 
     The same where no record has a gap, or no output moves.
     """
-    settled = _begun_anew(problem, theta)
+    settled = _with_load_starts(problem, theta)
     if settled is problem:
         return problem, theta
     for _ in range(_ROUNDS):
         theta = solve(settled, theta, run=run).theta
-        settled = _begun_anew(settled, theta)
+        settled = _with_load_starts(settled, theta)
     return settled, theta
 
 
-def _begun_anew(problem: Problem, theta: FloatArray) -> Problem:
+def _with_load_starts(problem: Problem, theta: FloatArray) -> Problem:
     """Return a problem that begins in the states that fit best at theta, and fits what is left of them."""
     rig, clocks = apply(problem.rig, problem.unknowns, theta)
     cases = tuple(_started(case, rig, clocks, problem) for case in problem.cases)
@@ -246,13 +246,13 @@ def _started(case: Case, rig: Rig, clocks: Clocks, problem: Problem) -> Case:
     begun = replace(case, drive=_beginning(drive, channel, states))
     own, shown = shown_by_starts(begun, others, rig, clocks, problem)
     ends = [*(k for k, _ in drive.restarts[1:]), len(drive.command)]
-    anew = {n: (np.zeros((len(columns), 4 * len(states))), case.mask[n]) for n, columns in shown.items()}
+    starts = {n: (np.zeros((len(columns), 4 * len(states))), case.mask[n]) for n, columns in shown.items()}
     for i, ((k, _), end) in enumerate(zip(drive.restarts, ends, strict=True)):
         for n, columns in shown.items():
             behind = slice(*np.searchsorted((case.t[n] - drive.start) / drive.step, (k, end)))
-            anew[n][0][behind, 4 * i : 4 * i + 4] = columns[behind]
-    states += sizes * change_of_starts(replace(case, anew=anew), own).reshape(-1, 4)
-    return replace(case, drive=_beginning(drive, channel, states), anew=anew)
+            starts[n][0][behind, 4 * i : 4 * i + 4] = columns[behind]
+    states += sizes * change_of_starts(replace(case, starts=starts), own).reshape(-1, 4)
+    return replace(case, drive=_beginning(drive, channel, states), starts=starts)
 
 
 def _state(

@@ -129,9 +129,8 @@ class Member:
             if component.kind is not Node:
                 kept.enter_context(_claim(self.node))
             known = {p.name for other in others for p in other.table}
-            self.program = component.make(
-                self.node, declare(self.node, component.table, component.more, known)
-            )
+            values = declare(self.node, component.table, component.more, known)
+            self.program = component.make(self.node, values)
             executor.add_node(self.node)
             self._kept = kept.pop_all()
 
