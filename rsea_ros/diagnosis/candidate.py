@@ -17,7 +17,11 @@ from rsea_ros.identification.solver import Map, Solution, serial, solve
 from rsea_ros.identification.start import settled_starts
 from rsea_ros.identification.unknowns import LOOP_CLOCK, Unknown
 from rsea_ros.model.drive import Drive, coarser, finer
+from rsea_ros.model.simulation import on_short_steps
 from rsea_ros.records.record import FloatArray
+
+_Run = tuple[tuple[Case, ...], list[dict[str, FloatArray]]]
+"""Cases, and the outputs of each."""
 
 
 def on_blocks(
@@ -188,9 +192,6 @@ GAIN, LAST_GAIN, _FARTHEST = 2e-4, 1e-6, 20.0
 """Relative fall of the cost, at the noise, below which a fit is done, and one of a model that is tested, far
 below the doubt of a parameter; times the noise up to which it grows with the residual, whose small falls mean
 nothing far above."""
-_STEP_ERROR = 0.05
-"""Of the noise: change by half a step from which a model is simulated on shorter ones. At 0.25 a delay that
-moved the steps off the commands paid for itself, and was confirmed."""
 
 
 @dataclass(frozen=True)
@@ -246,26 +247,16 @@ def refit(model: Candidate, setup: FitSetup) -> Candidate:
 
 
 def on_fine_steps(model: Candidate, setup: FitSetup) -> Candidate:
-    """Return a candidate on steps so short that its simulation errs less than the sensors; itself if it does.
-
-    The error of a step is the change by half of it. Where half of that changes as much, as in contacts that
-    bounce, a shorter step is no better, and none is taken. Nor is one of a loop, which samples as it steps.
-    """
+    """Return a candidate `on_short_steps`; itself if its own are, or a loop samples as it steps."""
     if model.problem.rig.loop is not None:
         return model
-    error = np.inf
-    best = cases, outputs = model.cases, model.outputs
-    for _ in range(_HALVINGS + 1):
+
+    def finer_of(run: _Run) -> _Run:
+        cases, _ = run
         halved = tuple(replace(c, drive=finer(c.drive)) if isinstance(c.drive, Drive) else c for c in cases)
-        finer_outputs = replace(model.problem, cases=halved).outputs(model.solution.theta)
-        change = _change(cases, outputs, finer_outputs)
-        if change > _FALLS * error:
-            break
-        best, error = (cases, outputs), change
-        if change < _STEP_ERROR:
-            break
-        cases, outputs = halved, finer_outputs
-    cases, outputs = best
+        return halved, replace(model.problem, cases=halved).outputs(model.solution.theta)
+
+    cases, outputs = on_short_steps((model.cases, model.outputs), finer_of, _change)
     return model if cases is model.cases else refit(rescore(replace(model, outputs=outputs), cases), setup)
 
 
@@ -278,15 +269,9 @@ def where_it_begins(model: Candidate, setup: FitSetup) -> Candidate:
     return refit(rescore(replace(model, outputs=settled.outputs(theta)), settled.cases), setup)
 
 
-_HALVINGS, _FALLS = 2, 0.5
-"""Of a step, whose error falls by 16 while the cost grows by 4; share to which one must bring the error."""
-
-
-def _change(
-    cases: Sequence[Case], before: Sequence[dict[str, FloatArray]], after: Sequence[dict[str, FloatArray]]
-) -> float:
+def _change(before: _Run, after: _Run) -> float:
     """Return the RMS change of outputs over the noise, in the worst channel of a case."""
-    runs = zip(cases, before, after, strict=True)
+    runs = zip(*before, after[1], strict=True)
     return max(
         float(np.sqrt(np.mean((a[n] - b[n])[c.mask[n]] ** 2))) / c.noise[n]
         for c, b, a in runs for n in c.noise if n in b and c.mask[n].any()
