@@ -28,35 +28,50 @@ _SLIDES = 12.0  # in creep velocities: 1 - tanh(12) = 8e-11
 _TURNS = 3.0  # in creep velocities: below it the motion may reverse, and its speed is not linear in time
 _STRAIGHT = 0.3  # friction's own change of speed times the whole: below it the speed goes nearly straight
 _PARTS = 4  # of a step in which it does not
+_OF_WIDTH, _MOST_PARTS = 8, 16  # parts a width over which friction fades, of all that the speed can change by
+_FADED = 4.0  # widths: exp(-16) = 1e-7
 _SHRINKS = 0.9  # of Newton's last change: larger ones come from swinging about the knee of tanh
 
 
 @njit(cache=True, error_model="numpy")
-def mean_friction(s, size, last, presliding):  # type: ignore[no-untyped-def]
+def mean_friction(s, size, last, presliding, more=0.0, fades=1.0):  # type: ignore[no-untyped-def]
     """Return the mean friction torque (N m, against motion when positive) of this step.
 
     size: friction torque at speed, N m. last: what this function returned at its last evaluation, which is
     already in the predicted end of the step. presliding: w_c, rad/s; s[CREEP] replaces it where that is set.
+    more: what comes on top near rest, N m; it fades as exp(-(w / fades)^2), fades in rad/s.
     """
     creep = s[CREEP] if s[CREEP] > 0.0 else presliding
     start = (s[GEAR_VELOCITY] - 0.5 * s[GEAR_VELOCITY_SPAN]) / creep
     predicted = (s[GEAR_VELOCITY] + 0.5 * s[GEAR_VELOCITY_SPAN]) / creep
-    mobility = s[MOBILITY] / creep
-    free, gain = predicted + mobility * last, mobility * size
-    if start > _SLIDES and free - gain > _SLIDES:
-        return size
-    if start < -_SLIDES and free + gain < -_SLIDES:
-        return -size
+    mobility, width = s[MOBILITY] / creep, fades / creep
     turns = start * predicted <= 0.0 or min(abs(start), abs(predicted)) < _TURNS
-    if not turns or gain * abs(predicted - start) < _STRAIGHT:
-        return size * _implicit_mean(start, free, gain)
+    if more != 0.0 and not turns and min(abs(start), abs(predicted)) > _FADED * width:
+        more = 0.0
+    free, gain = predicted + mobility * last, mobility * (size + more)
+    if more == 0.0 and start > _SLIDES and free - gain > _SLIDES:
+        return size
+    if more == 0.0 and start < -_SLIDES and free + gain < -_SLIDES:
+        return -size
+    parts = _PARTS if turns and gain * abs(predicted - start) >= _STRAIGHT else 1
+    if more != 0.0:
+        parts = max(parts, min(1 + int(_OF_WIDTH * (abs(free - start) + gain) / width), _MOST_PARTS))
     at, total = start, 0.0
-    for _ in range(_PARTS):
-        rise = (free - start) / _PARTS
-        mean = _implicit_mean(at, at + rise, gain / _PARTS)
-        at += rise - gain / _PARTS * mean
-        total += mean
-    return size * total / _PARTS
+    rise, mobility = (free - start) / parts, mobility / parts
+    for _ in range(parts):
+        torque = size
+        if more != 0.0:
+            middle = at + 0.5 * (rise - mobility * (size + more * _fade(at, width)) * math.tanh(at))
+            torque += more * _fade(middle, width)
+        mean = _implicit_mean(at, at + rise, mobility * torque)
+        at += rise - mobility * torque * mean
+        total += torque * mean
+    return total / parts
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _fade(w, width):  # type: ignore[no-untyped-def]
+    return math.exp(-(w / width) * (w / width))
 
 
 @njit(cache=True, error_model="numpy")

@@ -25,7 +25,7 @@ def level(p, w):  # type: ignore[no-untyped-def]
 @compiled
 def apply(s, p, x):  # type: ignore[no-untyped-def]
     """Subtract the friction torque from the torque on the gear output."""
-    x[0] = mean_friction(s, level(p, s[GEAR_VELOCITY]), x[0], p[3])
+    x[0] = mean_friction(s, p[0], x[0], p[3], p[1], p[2])
     s[GEAR_TORQUE] -= x[0]
 
 

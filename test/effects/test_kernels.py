@@ -89,11 +89,11 @@ def test_friction_brakes_a_step_by_the_mean_that_it_has_itself(start, free, gain
     assert along == pytest.approx(mean, abs=2e-6)
 
 
-def friction(start, predicted, size, mobility, creep):
+def friction(start, predicted, size, mobility, creep, *more):
     s = np.zeros(64)
     s[GEAR_VELOCITY], s[GEAR_VELOCITY_SPAN] = 0.5 * (start + predicted), predicted - start
     s[MOBILITY], s[CREEP] = mobility, creep
-    return _friction.mean_friction.py_func(s, size, 0.0, 0.01)
+    return _friction.mean_friction.py_func(s, size, 0.0, 0.01, *more)
 
 
 @pytest.mark.parametrize(
@@ -110,6 +110,22 @@ def test_the_mean_friction_of_a_step_is_that_of_the_motion_it_brakes(start, pred
             (0.0, 1.0), [start, 0.0], rtol=1e-9, atol=1e-12,
         ).y[1, -1]  # fmt: skip
         assert friction(start, predicted, size, mobility, creep) == pytest.approx(truth, abs=0.03 * size)
+
+
+@pytest.mark.parametrize(
+    ("start", "predicted"), [(0.3, 0.31), (0.12, 0.06), (0.08, -0.05), (-0.03, 0.09), (0.06, 0.02)]
+)
+def test_friction_that_fades_with_speed_is_that_of_the_whole_motion(start, predicted):
+    """Taken at one speed of the step it was off by half of itself where the step crosses what fades."""
+    size, more, fades, mobility = 1.5, 2.0, 0.05, 0.01
+
+    def moved(_, x):
+        torque = (size + more * math.exp(-((x[0] / fades) ** 2))) * math.tanh(x[0] / 0.01)
+        return [predicted - start - mobility * torque, torque]
+
+    truth = solve_ivp(moved, (0.0, 1.0), [start, 0.0], rtol=1e-9, atol=1e-12).y[1, -1]
+    mean = friction(start, predicted, size, mobility, 0.0, more, fades)
+    assert mean == pytest.approx(truth, abs=0.02 * more)
 
 
 CHASSIS = _chassis.SprungChassis(1500.0, 3.0, 0.004)
