@@ -95,41 +95,6 @@ def is_apart(effect: Effect, model: Problem) -> bool:
     return bool(sensors - late - {effect.sensor} - ({"motor_torque"} if late else set()))
 
 
-def with_clocks_in_delays(solution: Solution) -> FloatArray | None:
-    """Return theta with the clock errors that are delays of the model converted into these.
-
-    The clock of a sensor that is read late goes into its delay, what the others share into the command's.
-    Where a delay is a whole number of samples the residual has a kink, and a fit may stop there with the rest
-    in the clocks. None for a model without a delay.
-    """
-    unknowns = solution.problem.unknowns
-    place = {u.name: i for i, u in enumerate(unknowns)}
-    acting = [(e, place.get(f"{e.name}.{e.main.name}")) for e in map(effect_named, solution.problem.acting)]
-    command = [at for e, at in acting if at is not None and "delay" in e.tags][:1]
-    late = {e.sensor: at for e, at in acting if at is not None and "late" in e.tags}
-    clocks = [i for i, u in enumerate(unknowns) if u.is_clock and not u.is_rate]
-    if not clocks or not (command or late):
-        return None
-    sensors = [sensor_of(unknowns[i].name.split(".")[1]) for i in clocks]
-    theta = solution.theta.copy()
-    for sensor, at in late.items():
-        own = [i for i, n in zip(clocks, sensors, strict=True) if n == sensor]
-        theta[at] -= _take_common(theta, own)
-    others = [i for i, n in zip(clocks, sensors, strict=True) if n not in late]
-    if command and others:
-        common = _take_common(theta, others)
-        theta[command] -= common
-        theta[list(late.values())] += common
-    return np.asarray(theta)
-
-
-def _take_common(theta: FloatArray, places: list[int]) -> float:
-    """Take from some clocks what they have in common, and return it, s."""
-    common = float(np.mean(theta[places])) if places else 0.0
-    theta[places] -= common
-    return common
-
-
 @dataclass(frozen=True)
 class Candidate:
     """A fitted model with its simulated channels on every case and its score on the validation blocks.
@@ -232,9 +197,6 @@ def fit_candidate(
     """
     masked = setup.mask(problem)
     solution = setup.solve(masked, theta, None if near is None else _reweight(near, masked))
-    moved = with_clocks_in_delays(solution)
-    if moved is not None:
-        solution = min(solution, setup.solve(masked, moved), key=lambda s: s.cost)
     outputs = solution.problem.outputs(solution.theta)
     validation = score_on(solution.problem, setup.cases, VALIDATION, outputs, setup.settings.blocks)
     return Candidate(solution, outputs, validation, setup.cases, setup.settings)

@@ -8,7 +8,7 @@ import math
 from bisect import bisect_left
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import lru_cache, partial
+from functools import lru_cache
 from typing import Any, TypeVar
 
 import numpy as np
@@ -475,11 +475,7 @@ def synthesize(rig: Rig, command: Channel, *, seed: int = 0, noise: bool = True)
         source=rig.name,
     )
     rng = sensor_noise(seed)
-    drive = drive_of(blank_record, rig)
-    simulated = drive, simulate_drive(rig, drive)
-    if rig.loop is None:
-        simulated = on_short_steps(simulated, partial(_on_half_steps, rig), partial(_changed, rig))
-    true = simulated[1]
+    true = _converged(rig, drive_of(blank_record, rig))
     for name, y in true.items():
         bad = ~(np.abs(y) <= LARGEST)
         if bad.any():
@@ -493,16 +489,19 @@ def synthesize(rig: Rig, command: Channel, *, seed: int = 0, noise: bool = True)
     return blank_record.with_channels(**measured)
 
 
-def _on_half_steps(rig: Rig, run: _Simulated) -> _Simulated:
-    drive = finer(run[0])
-    return drive, simulate_drive(rig, drive)
+def _converged(rig: Rig, drive: Drive) -> dict[str, FloatArray]:
+    """Return the channels of a drive `on_short_steps`."""
 
+    def moved(before: _Simulated, after: _Simulated) -> float:
+        noises = {n: rig.sensors[n].noise for n in before[1] if n in rig.sensors}
+        squares = {n: np.mean((before[1][n] - after[1][n]) ** 2) for n, s in noises.items() if s > SMALLEST}
+        return max((math.sqrt(square) / noises[n] for n, square in squares.items()), default=0.0)
 
-def _changed(rig: Rig, before: _Simulated, after: _Simulated) -> float:
-    """Return the RMS change of the channels over the noise, in the worst that has some."""
-    noises = [(n, rig.sensors[n].noise) for n in before[1] if n in rig.sensors]
-    squares = {n: np.mean((before[1][n] - after[1][n]) ** 2) for n, _ in noises}
-    return max((math.sqrt(squares[n]) / noise for n, noise in noises if noise > SMALLEST), default=0.0)
+    def halved(run: _Simulated) -> _Simulated:
+        return (half := finer(run[0])), simulate_drive(rig, half)
+
+    run = drive, simulate_drive(rig, drive)
+    return (on_short_steps(run, halved, moved) if rig.loop is None else run)[1]
 
 
 def sensor_noise(seed: int) -> np.random.Generator:

@@ -7,27 +7,21 @@ import numpy as np
 import pytest
 from effect_bench import RIG, command
 from runs import trying
-from similar_machine import record_with
 
 from rsea_ros.cli.export import exporter
 from rsea_ros.control.compensation import compensation
 from rsea_ros.control.law import responses, sample_rig
 from rsea_ros.control.uncertainty import lag_responses
-from rsea_ros.diagnosis.candidate import with_clocks_in_delays
 from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.diagnosis.naming.conclusion import undetermined_play
 from rsea_ros.effects.catalogue import catalogue, effect_named
-from rsea_ros.identification.fit import unknowns_of
 from rsea_ros.identification.identify import identify
-from rsea_ros.identification.problem import Problem, case_from
-from rsea_ros.identification.solver import solve
 from rsea_ros.identification.unknowns import start_vector, unknowns_of_effect
 from rsea_ros.laws.choice import fitted_base
 from rsea_ros.model.observer.assemble import without_delay
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
 from rsea_ros.plugins import TARGETS, in_extras
-from rsea_ros.records.record import MEASURED
 from rsea_ros.report.diagnosis.figures import part_of
 
 PADDLE = '''
@@ -164,6 +158,3 @@ def test_a_delay_of_another_name_is_treated_as_a_delay():
     response, path = lag_responses(rig, plant, hz)
     assert path[0] == pytest.approx(np.exp(-2j * math.pi * 10.0 * 4e-3))
     np.testing.assert_array_equal(response, responses(plant, hz))
-    case = case_from(record_with(RIG, effect_named("late_bus"), 1.0, duration=5.0), rig)
-    solution = solve(Problem((case,), rig, unknowns_of(rig, (case,)), MEASURED), iterations=0)
-    assert with_clocks_in_delays(solution) is not None
