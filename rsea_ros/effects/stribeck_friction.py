@@ -42,8 +42,8 @@ EFFECT = Effect(
             reason="friction above the largest torque would hold the machine still",
         ),
         Parameter(
-            "stribeck_velocity", "rad/s", null=0.05, low=0.005, high=1.0, typical=0.05, starts=(0.015, 0.2), logarithmic=True,
-            reason="from a hundredth of the largest speed to more than it",
+            "stribeck_velocity", "rad/s", null=0.05, low=0.005, high=1.0, typical=0.05, starts=(0.015, 0.2),
+            logarithmic=True, reason="from a hundredth of the largest speed to more than it",
         ),
         PRESLIDING,
     ),

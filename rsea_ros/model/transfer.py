@@ -44,24 +44,16 @@ class Fraction:
         return np.asarray(np.polyval(self.numerator, s) / np.polyval(self.denominator, s))
 
 
-def distal_per_proximal(rig: Rig, sees: Sees = "spring_and_damper") -> TransferFunction:
-    """Return T_d / T_p while the motor drives. Both ends clamped: Eq. (6) with J_sc + n J_r for J_sc."""
-    return _transfer_function(_distal_over_proximal(rig, sees))
-
-
-def _distal_over_proximal(rig: Rig, sees: Sees) -> Fraction:
-    above, _ = _expand(rig, outputs.distal(rig, sees), "gear")
-    below, _ = _expand(rig, outputs.proximal(rig), "gear")
-    return _reduce(above, below)
-
-
 def transfer(rig: Rig, output: Output, port: str = "gear") -> TransferFunction:
     """Return any output over the torque at any of equations.PORTS.
 
     Over T_m with both ends clamped, outputs.distal(rig, "element") is Eq. (4), and outputs.proximal(rig) is
     Eq. (5) with J_sc + n J_r for J_sc.
     """
-    return _transfer_function(_reduce(*_expand(rig, output, port)))
+    from control import TransferFunction  # takes a second, which no verb waits for
+
+    fraction = _reduce(*_expand(rig, output, port))
+    return TransferFunction(fraction.numerator, fraction.denominator)
 
 
 def read(system: propagator.StateSpace, output: Output) -> tuple[FloatArray, FloatArray]:
@@ -113,12 +105,6 @@ def _reduce(numerator: FloatArray, denominator: FloatArray) -> Fraction:
     """Return the fraction without common powers of s (a rig free to turn as a whole has them)."""
     common = min(int(np.argmax(p != 0.0)) for p in (numerator, denominator) if p.any())
     return Fraction(numerator[common:][::-1], denominator[common:][::-1])
-
-
-def _transfer_function(fraction: Fraction) -> TransferFunction:
-    from control import TransferFunction  # takes a second, which no verb waits for
-
-    return TransferFunction(fraction.numerator, fraction.denominator)
 
 
 def end_response(rig: Rig, hz: FloatArray, end: str = "spring_end") -> ComplexArray:
@@ -192,7 +178,9 @@ def _factor(inertia: FloatArray) -> FloatArray:
 
 def end_to_end(rig: Rig, sees: Sees = "spring_and_damper") -> Fraction:
     """Return T_d / T_p of the rig with both ends clamped, exactly; Eq. (6) approximates it."""
-    return _distal_over_proximal(replace(rig, clamped=frozenset(END_NAMES)), sees)
+    clamped = replace(rig, clamped=frozenset(END_NAMES))
+    ends = outputs.distal(clamped, sees), outputs.proximal(clamped)
+    return _reduce(*(_expand(clamped, end, "gear")[0] for end in ends))
 
 
 def flat_band(function: Fraction, tolerance_db: float = 3.0, tolerance_deg: float = 90.0) -> float:

@@ -82,7 +82,7 @@ def test_the_high_impedance_response_is_the_papers_but_for_the_rotors_spin():
     eq_6 = formulas.eq_6_distal_per_proximal(K_S, j, B_S)
     agree(distal_per_motor(rig, "element")(S), EQ_1(S))
     agree(proximal_per_motor(rig)(S) * (J_EFF * S**2 + B_EFF * S + K_S), eq_5.numerator @ [S**2, S, S**0])
-    agree(transfer.distal_per_proximal(rig, "element")(S), eq_6(S))
+    agree(transfer.end_to_end(rig, "element")(S), eq_6(S))
 
 
 @pytest.mark.parametrize("train", ["planetary", "star"])
@@ -116,7 +116,7 @@ def test_lumped_model_is_eqs_1_to_3():
     rig = lumped_rig(load_rig("paper_high_impedance"))
     agree(distal_per_motor(rig, "element")(S), EQ_1(S))
     agree(proximal_per_motor(rig)(S), transfer.Fraction([J_EFF, B_S, K_S], [J_EFF, B_EFF, K_S])(S))
-    agree(transfer.distal_per_proximal(rig, "element")(S), transfer.Fraction([K_S], [J_EFF, B_S, K_S])(S))
+    agree(transfer.end_to_end(rig, "element")(S), transfer.Fraction([K_S], [J_EFF, B_S, K_S])(S))
 
 
 @pytest.mark.parametrize("name", WITH_SPRING)
@@ -125,7 +125,7 @@ def test_held_by_the_other_end_the_two_torques_change_places(name):
     other = replace(rig, proximal="spring_end")
     agree(distal_per_motor(other)(S), proximal_per_motor(rig)(S))
     agree(proximal_per_motor(other)(S), distal_per_motor(rig)(S))
-    agree(transfer.distal_per_proximal(other)(S), 1 / transfer.distal_per_proximal(rig)(S))
+    agree(transfer.end_to_end(other)(S), 1 / transfer.end_to_end(rig)(S))
 
 
 def test_the_damper_turns_the_phase_of_what_the_sensor_sees():
