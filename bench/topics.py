@@ -20,11 +20,11 @@ TOPICS: Mapping[str, Mapping[str, str]] = {
         **_named("controller", "controller", "restarts"),
     },
     "observer": {
-        "lacks": "lacks:lacks", "flag": "flag:flag", "tight": "timing:tight", "timing": "timing:timing",
+        "lacks": "lacks:lacks", "tight": "timing:tight", "timing": "timing:timing",
     },
     "health": _named("score", "alarms", "faults", "node"),
     "diagnosis": {
-        "score": "score", **_named("hidden", "coverage", "overlap"), **_named("edits", "edits"),
+        "score": "score", **_named("edits", "edits"),
         **_mains("intervals", "settings"),
     },
     "frozen": _mains("play", "ablation"),
