@@ -2,7 +2,7 @@
 
 Homes: `sea` and `sea, backlash` are the kind of machine that this project is made for, simulated by
 test/independent, which shares no code with it. `pendulum, BAM's friction` is BAM's home: its own law, by the
-very equations that its adapter fits. `black box` is nobody's physics. Silverbox and EMPS are other people's.
+very equations that its adapter fits. EMPS is other people's.
 """
 
 from collections.abc import Callable, Mapping
@@ -12,7 +12,6 @@ from pathlib import Path
 import numpy as np
 from independent.bench import Bench, record_run
 from scipy.io import loadmat
-from scipy.signal import butter, lfilter
 
 from bench.peers.second_order import NAMES, simulate_run
 from rsea_ros.records.record import FloatArray
@@ -100,23 +99,6 @@ def pendulum() -> PeerRecord:
     return PeerRecord(name, u, y, rate, split, "joint", stated, noise, y, velocity, truth, cause)
 
 
-def black_box() -> PeerRecord:
-    """A filter, a saturating curve, a filter: no joint at all."""
-    rng = np.random.default_rng(6)
-    n = 3000
-    u = lfilter(*butter(2, 0.3), rng.normal(size=n))
-    inner = lfilter(*butter(2, 0.2), u) / 0.25
-    y = lfilter(*butter(1, 0.25), np.tanh(inner) + 0.2 * inner**2)
-    return PeerRecord("black box", u, y + 0.005 * rng.normal(size=n), 100.0, 2250, "none", {}, 0.005)
-
-
-def silverbox(data: Path) -> PeerRecord:
-    """The first 10 000 samples of the multisine of the training part; the last 2500 held out."""
-    path = data / "silverbox" / "SNLS80mV.csv"
-    u, y = np.genfromtxt(path, delimiter=",", skip_header=1, usecols=(0, 1), max_rows=50650)[40650:].T
-    return PeerRecord("silverbox", u.copy(), y.copy(), 1e7 / 2**14, 7500, "duffing", {})
-
-
 def emps(data: Path) -> PeerRecord:
     """The identification record at 100 Hz, force as input; after 16 s held out, a free run."""
     held = loadmat(data / "emps" / "DATA_EMPS.mat")
@@ -128,5 +110,5 @@ def emps(data: Path) -> PeerRecord:
     return PeerRecord("emps", u, y, 100.0, 1600, "drive", stated, position=y, truth=published)
 
 
-SIMULATED: tuple[Callable[[], PeerRecord], ...] = (sea, sea_backlash, pendulum, black_box)
-REAL: tuple[Callable[[Path], PeerRecord], ...] = (silverbox, emps)
+SIMULATED: tuple[Callable[[], PeerRecord], ...] = (sea, sea_backlash, pendulum)
+REAL: tuple[Callable[[Path], PeerRecord], ...] = (emps,)

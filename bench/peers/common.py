@@ -82,12 +82,6 @@ def main(name: str, source: str, target: str, budget: str) -> None:
         json.dump(contents, file)
 
 
-def scale(case: PeerCase) -> tuple[Array, Array, float, float]:
-    """Return u and the known y, both scaled by the training samples; and mean and deviation of y."""
-    u, y = case.u, case.y[: case.split]
-    return (u - u[: case.split].mean()) / u[: case.split].std(), (y - y.mean()) / y.std(), y.mean(), y.std()
-
-
 if __name__ == "__main__":
     from common import main as run_peer  # under the name by which the peers know its classes
 

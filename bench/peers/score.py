@@ -24,17 +24,9 @@ PINS = {
     "mujoco_sysid": "mujoco[sysid]==4.0.0 scipy==1.16.3",
     "bam": "cma==4.5.0 numba==0.68.1 scipy==1.17.1",
     "cma_pace": "cma==4.5.0 numba==0.68.1 scipy==1.17.1",
-    "sysidentpy": "sysidentpy==0.9.0",
-    "jax_sysid": "jax-sysid==1.1.0",
-    "pysindy": "pysindy==2.1.0",
-    "lstm": "torch==2.13.0 numpy==2.3.5",
-    "gp": "scikit-learn==1.9.1 scipy==1.16.3",
 }
 """By peer: the versions that were compared, for who makes its environment; nothing here installs them."""
-PEERS = {
-    "rsea": "with_rsea", "mujoco_sysid": "with_mujoco_sysid", "bam": "joints", "cma_pace": "joints",
-    **dict.fromkeys(("sysidentpy", "jax_sysid", "pysindy", "lstm", "gp"), "black_boxes"),
-}  # fmt: skip
+PEERS = {"rsea": "with_rsea", "mujoco_sysid": "with_mujoco_sysid", "bam": "joints", "cma_pace": "joints"}
 """By peer: the module with a function of its name."""
 PATIENCE = 8.0
 """Times the budget: wall seconds after which a peer is stopped; the machine may be busy with others."""
@@ -50,7 +42,7 @@ def main(
     """Run what is missing, and print the table.
 
     cases: names of cases, all where none is named
-    realdata: folder with silverbox and emps; without it those cases are left out
+    realdata: folder with emps; without it that case is left out
     budget: processor seconds for a fit; 0: run nothing, print the results so far
     envs: environments
     out: cases and results

@@ -1,7 +1,4 @@
-"""This project: `diagnose` on the training samples with the rig of the case, then a free run of its model.
-
-Silverbox has a rig whose effects are stated; there the rig is fitted as in bench/public/score.py.
-"""
+"""This project: `diagnose` on the training samples with the rig of the case, then a free run of its model."""
 
 import sys
 from dataclasses import replace
@@ -12,16 +9,13 @@ from common import NotApplicable, PeerCase, PeerResult
 
 sys.path.append(str(Path(__file__).resolve().parents[2]))
 
-from bench.public.fit import RIGS, case_of, fit_rig, record_of, rig_of
 from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.errors import RigError
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.model.simulation import simulate, simulate_drive
+from rsea_ros.model.simulation import simulate
 from rsea_ros.records.record import Channel, Record
 
 RIG_OF = {"sea": "paper_high_impedance", "joint": "pendulum", "drive": "emps"}
-TORQUE, ANGLE = 2000.0, 0.02
-"""1 V of the silverbox in the units of its rig: N m, rad."""
 PARAMETERS = {
     "inertia": ("rotor.reflected_inertia", "chassis.inertia", "spring_end.inertia"),
     "damping": ("rotor.reflected_damping", "spring.damping", "spring_end.damping"),
@@ -34,8 +28,6 @@ PARAMETERS = {
 def rsea(case: PeerCase) -> PeerResult:
     """Diagnose and predict."""
     physics = case.meta["physics"]
-    if physics == "duffing":
-        return _duffing(case)
     if physics not in RIG_OF:
         raise NotApplicable("no physics to diagnose")
     record = _record(case, case.split)
@@ -69,13 +61,3 @@ def _record(case: PeerCase, n: int) -> Record:
         if y.size:
             channels[name] = Channel(ends, y[:n] if n == case.split else blank)
     return Record(channels, case.meta["name"])
-
-
-def _duffing(case: PeerCase) -> PeerResult:
-    rig = load_rig(RIGS / "silverbox.yaml")
-    n, rate = case.split, 1.0 / case.period
-    train = record_of(TORQUE * case.u[:n], ANGLE * case.y[:n], rate)
-    rig = rig_of(fit_rig(rig, [case_of(rig, train, skip=200)]))
-    whole = record_of(TORQUE * case.u, np.zeros(len(case.u)), rate)
-    drive = case_of(rig, whole, skip=0).drive
-    return PeerResult(simulate_drive(rig, drive)["position"][n:] / ANGLE, note="rig with stated effects")
