@@ -22,7 +22,7 @@ TOPICS: Mapping[str, Mapping[str, str]] = {
     "observer": {
         "lacks": "lacks:lacks", "tight": "timing:tight", "timing": "timing:timing",
     },
-    "health": _named("score", "alarms", "faults", "node"),
+    "health": _named("score", "alarms", "faults"),
     "diagnosis": {
         "score": "score", **_named("edits", "edits"),
         **_mains("intervals", "settings"),
@@ -32,7 +32,6 @@ TOPICS: Mapping[str, Mapping[str, str]] = {
     "control": _mains("tables"),
     "fleet": _mains("trends"),
     "inputs": _mains("score"),
-    "laws": _mains("score"),
     "mutants": _mains("score"),
     "packaging": _mains("pythons"),
     "peers": _mains("score"),
