@@ -30,7 +30,6 @@ TOPICS: Mapping[str, Mapping[str, str]] = {
     "frozen": _mains("play", "ablation"),
     "calibration": _named("score", "make", "fit", "score"),
     "control": _mains("tables"),
-    "fleet": _mains("trends"),
     "inputs": _mains("score"),
     "mutants": _mains("score"),
     "packaging": _mains("pythons"),
