@@ -3,8 +3,8 @@
 Run: python -m bench control [SECTION …] [RIG] [--free RIG] [--rate 280 1000].
 Sections: trials (the whole set swept, and 5 Hz simulated on all of its corners; the requirements, nominal and
 worst: `rsea control`), free (a free load, unknown, by frequency and amplitude, without
-and with an encoder on the link), impedance (the outer loop), link (the benefit of that encoder), baselines
-and users (docs/baselines.md). Through real nodes: `driver controller`.
+and with an encoder on the link), impedance (the outer loop), link (the benefit of that encoder), users
+(docs/baselines.md). Through real nodes: `driver controller`.
 """
 
 import math
@@ -13,7 +13,6 @@ from typing import Annotated
 
 import numpy as np
 
-from bench.control.baselines import baselines
 from bench.control.human import Virtual, measure_impedance, passive_to, stiffest
 from bench.control.users import users
 from bench.results import Row
@@ -98,8 +97,7 @@ def outer(rig: Rig, free: Rig, rate: float) -> Iterator[str]:
 
 
 SECTIONS: dict[str, Callable[[Rig, Rig, float], Iterator[Row | str]]] = {
-    "trials": trials, "free": unknown, "impedance": outer, "link": with_link,
-    "baselines": baselines, "users": users,
+    "trials": trials, "free": unknown, "impedance": outer, "link": with_link, "users": users,
 }  # fmt: skip
 
 

@@ -133,7 +133,8 @@ class Plan:
             record = FAULTS[fault](record, rng)
         about = {"group": self.group, "faults": self.faults}
         about |= {"mimics": OFF_CATALOGUE[self.off[0]][1]} if self.off else {}
-        truth = (self.without, tuple(self.hidden), self.hidden)
+        values = {name: getattr(plain.plant, alias) for name, alias in RIG_VALUES.items()}
+        truth = (self.without, tuple(self.hidden), self.hidden, values)
         return Played(record, load_rig(RIG), *truth, fresh=again, about=about)
 
 

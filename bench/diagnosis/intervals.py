@@ -5,7 +5,6 @@ from typing import Annotated
 
 import numpy as np
 from independent.bench import drawn_bench, record_run
-from scipy.signal import lfilter
 
 from bench.diagnosis.cases import RIG, RIG_VALUES
 from bench.results import Row
@@ -15,27 +14,10 @@ from rsea_ros.model.rig_file import load_rig
 from rsea_ros.records.record import Channel, Record
 
 SYMBOLS = dict(zip(RIG_VALUES, ("J_m", "b_m", "K_s", "b_s"), strict=True))
-COLOURED = {"ft": 0.06, "position": 1.5e-5}
-"""RMS of the coloured noise, N m and rad."""
 CLOCKS = {"ft": "ft", "command": "command", "position": "joint", "velocity": "joint", "motor_torque": "joint"}
 """Channels whose stamps come in one message."""
 
 Spoil = Callable[[Record, np.random.Generator], Record]
-
-
-def keep_record(record: Record, rng: np.random.Generator) -> Record:
-    """Return the record as it is."""
-    return record
-
-
-def with_coloured_noise(record: Record, rng: np.random.Generator) -> Record:
-    """Return the record with noise of first order, 0.9 from sample to sample, on F/T torque and position."""
-    changed = {}
-    for name, rms in COLOURED.items():
-        white = rng.normal(size=len(record[name]) + 500)
-        noise = rms * np.sqrt(1.0 - 0.9**2) * lfilter([1.0], [1.0, -0.9], white)[500:]
-        changed[name] = Channel(record[name].t.copy(), record[name].y + noise)
-    return record.with_channels(**changed)
 
 
 def jitter(clocks: Sequence[str], by: float = 3e-4) -> Spoil:
@@ -51,18 +33,14 @@ def jitter(clocks: Sequence[str], by: float = 3e-4) -> Spoil:
     return spoil
 
 
-SCENARIOS: dict[str, tuple[dict[str, float], Spoil]] = {
-    "white noise": ({}, keep_record),
-    "coloured noise, AR 0.9": ({}, with_coloured_noise),
+SCENARIOS: dict[str, tuple[dict[str, float], Spoil | None]] = {
+    "white noise": ({}, None),
     "sensor stamps off by 0.3 ms": ({}, jitter(("ft", "joint"))),
     "command stamps off by 0.3 ms": ({}, jitter(("command",))),
     "all stamps off by 0.3 ms": ({}, jitter(("command", "ft", "joint"))),
-    "Coulomb friction 0.02 N·m": ({"coulomb": 0.02}, keep_record),
-    "Coulomb friction 0.1 N·m": ({"coulomb": 0.1}, keep_record),
-    "Coulomb friction 0.3 N·m": ({"coulomb": 0.3}, keep_record),
-    "motor constant 10 % off": ({"torque_gain": 1.1}, keep_record),
-    "F/T gain 10 % off": ({"ft_gain": 1.1}, keep_record),
-    "command delay 2 ms": ({"delay": 2e-3}, keep_record),
+    **{f"Coulomb friction {torque:g} N·m": ({"coulomb": torque}, None) for torque in (0.02, 0.1, 0.3)},
+    "motor constant 10 % off": ({"torque_gain": 1.1}, None),
+    "command delay 2 ms": ({"delay": 2e-3}, None),
 }
 
 
@@ -71,7 +49,8 @@ def outcome(name: str, seed: int, duration: float) -> tuple[Identification, dict
     hidden, spoil = SCENARIOS[name]
     bench = drawn_bench(np.random.default_rng(seed)).with_values(**hidden)
     excitation = ("chirp_noise", "multisine", "white_noise")[seed % 3]
-    record = spoil(record_run(bench, seed, excitation, duration), np.random.default_rng(seed + 10_000))
+    record = record_run(bench, seed, excitation, duration)
+    record = spoil(record, np.random.default_rng(seed + 10_000)) if spoil else record
     plant = bench.plant._asdict()
     return identify([record], load_rig(RIG)), {n: plant[alias] for n, alias in RIG_VALUES.items()}
 

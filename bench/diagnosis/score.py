@@ -10,8 +10,8 @@ import numpy as np
 from independent.hidden import BESIDE_THE_CONTRACT, CATALOGUE, MAIN_PARAMETER
 
 from bench.diagnosis import played
-from bench.diagnosis.cases import plan, shared_records
-from bench.diagnosis.played import Entry, Line, confirmed_of, is_error, names_of, play_all
+from bench.diagnosis.cases import RIG_VALUES, plan, shared_records
+from bench.diagnosis.played import DOUBTED, Entry, Line, confirmed_of, is_error, names_of, play_all
 from bench.results import Row, read_lines
 from rsea_ros.diagnosis.settings import DEFAULT
 
@@ -47,6 +47,14 @@ def of_ended(key: str, value: Callable[[Line], float]) -> Values:
     ]  # fmt: skip
 
 
+def of_z(of_rig: bool) -> Values:
+    """Return what tells the sigmas from the truth of the rig's values or of sizes, names right."""
+    return lambda lines: [
+        z for x in lines if x.get("group") in HIDDEN
+        for name, z in x.get("z", {}).items() if not name.endswith(DOUBTED) and (name in RIG_VALUES) == of_rig
+    ]  # fmt: skip
+
+
 def _error(truth: float, value: float, *_: float) -> float:
     """Return the error of a size relative to the truth; absolute where the truth is zero."""
     return abs(value - truth) / (abs(truth) or 1.0)
@@ -58,6 +66,10 @@ def _share(values: Sequence[float]) -> float:
 
 def _median(values: Sequence[float]) -> float:
     return float(np.median(values))
+
+
+def _rms(values: Sequence[float]) -> float:
+    return float(np.sqrt(np.mean(np.square(values))))
 
 
 MEASURES: Sequence[tuple[str, Values, Callable[[Sequence[float]], float], str]] = (
@@ -82,6 +94,8 @@ MEASURES: Sequence[tuple[str, Values, Callable[[Sequence[float]], float], str]] 
     ("main parameter within 10 %, %", of_sizes(lambda *n: _error(*n) <= 0.1), _share, ">= 100"),
     ("main parameter in its 95 % interval, %", of_sizes(lambda t, _, low, high: low <= t <= high),
      _share, ">= 90"),
+    ("z of the rig's values, RMS", of_z(True), _rms, "0.8 to 1.3"),
+    ("z of the causes' sizes, RMS", of_z(False), _rms, "0.8 to 1.3"),
     ("held-out residual at the noise floor, %",
      of_ended("times_noise", lambda x: x["times_noise"] <= FLOOR), _share, ">= 95"),
     ("residual on a fresh record at the noise floor, %",

@@ -2,7 +2,6 @@
 
 alarms  false alarms over hours of clean work
 faults  each fault switched on after five minutes of work: named, delay, size
-node    CPU of the node with its subscriptions, beside plant and excite, while it learns and afterwards
 """
 
 import time
@@ -14,7 +13,6 @@ import numpy as np
 from independent.bench import Bench, record_command
 
 from bench.diagnosis.cases import RIG, RIG_VALUES
-from bench.processes import cpu_time, run_node
 from bench.results import Row
 from rsea_ros.health.health_finding import HealthFinding, WatchSettings
 from rsea_ros.health.monitor import Monitor
@@ -31,10 +29,6 @@ DOUBT = dict(zip(RIG_VALUES, (0.003, 0.02, 0.002, 0.03), strict=True))
 FRICTION_DOUBT = 0.03
 CLEAN, WORN = 300.0, 60.0
 """s of work before a fault, with learning (it waits for motion), and after it."""
-LEARNED = 220.0
-"""s after the start of a joint in motion when learning is over."""
-WINDOW = 10.0
-"""s over which a share of a core is taken."""
 
 
 class Fault(NamedTuple):
@@ -192,23 +186,3 @@ def faults(*, seeds: tuple[int, ...] = (0, 1, 2)) -> Iterator[Row | str]:
         delays = [delay for _, delay in each]
         told = f"{sum(right for right, _ in each)} of {len(each)}, median {np.median(delays):.1f} s"
         yield Row(f"{name}: named, after", "all", f"{told}, at most {max(delays):.1f} s")
-
-
-def node(*, rate: float = 280.0, seconds: float = 30.0) -> Iterator[Row]:
-    """Measure CPU time of the node with its subscriptions, beside plant and excite."""
-    moves = {"kind": "multisine", "low": 0.2, "high": 6.0, "amplitude": 6.0, "duration": seconds + LEARNED}
-    with (
-        run_node("plant", rate=rate),
-        run_node("excite", subscribers=2, rate=rate, **moves),
-        run_node("health", out="/nonexistent", bags=0) as health,
-    ):
-        begun, used = time.monotonic(), [0.0]
-        while len(used) * WINDOW <= LEARNED + seconds:
-            time.sleep(max(0.0, begun + len(used) * WINDOW - time.monotonic()))
-            used.append(cpu_time(health.pid))
-    yield Row(f"node, {rate:g} Hz, until {WINDOW:g} s after its start", "", f"{used[1]:.1f} s of a core")
-    shares = 100.0 * np.diff(used[1:]) / WINDOW
-    learned = round(LEARNED / WINDOW) - 1
-    for phase, part in (("while it learns", shares[:learned]), ("afterwards", shares[learned:])):
-        told = f"{np.mean(part):.2f} % of a core, at most {np.max(part):.2f} % over {WINDOW:g} s"
-        yield Row(f"node, {rate:g} Hz, {phase}", "< 5 % at 280 Hz", told)

@@ -12,11 +12,13 @@ import random
 import re
 import signal
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import FrameType
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -29,18 +31,17 @@ from msg_adapters import iterate, read_record, write_record
 from rsea_ros.cli.simulate import parse_effect
 from rsea_ros.design.motor_gear_units import catalogue
 from rsea_ros.effects.catalogue import catalogue as effects
+from rsea_ros.effects.effect import Effect
 from rsea_ros.errors import RseaError
 from rsea_ros.hardware.netft.calibration import parse
 from rsea_ros.model.rig_file import load_rig, rig_folders
 from rsea_ros.nodes._joint_inputs import noise_from
 from rsea_ros.records.record import Channel, Record
 
-BATCH, SLOW = 50, 20
-"""Files of a batch; s of processor for one, above which it counts as endless: all of them are small."""
-EVERY = 8
-"""One in this many files goes on into a verb that computes with it."""
-
-
+BATCH, SLOW, EVERY = 50, 20, 8
+"""Files of a batch; s of processor for one, above which it counts as endless: all of them are small; one in
+so many goes on into a verb that computes with it."""
+DEEP = b"[" * 100_000
 CSV = "t,phi,i,load\n" + "".join(f"{k / 100:.2f},{k % 7},{k % 11 - 5},{k}\n" for k in range(60))
 MAP = """about: a bench
 time: {column: t, unit: s}
@@ -83,34 +84,49 @@ def play_import(file_name: str, of_file: str = MAP, *, is_map: bool = False) -> 
     return play
 
 
+ODD: Sequence[Any] = (
+    np.arange(60, dtype="i1"), np.arange(60, dtype=">f4"), np.full(60, np.nan), np.full(60, np.inf),
+    np.full(60, 10**18), np.zeros((60, 0)), np.zeros((60, 2, 2)), np.array(["x"] * 60), np.array(3.0),
+    np.array([None] * 60, dtype=object), np.arange(60) * 1j, np.arange(60).astype("M8[ns]"),
+    np.zeros(60, dtype=[("a", "f8"), ("b", "i2")]), np.arange(57, dtype="f2"), [True] * 60, [b"x"] * 60,
+    [None if k % 2 else 1.0 for k in range(60)], [None if k % 7 else [1.0, 2.0, 3.0] for k in range(60)],
+    *(pa.array(range(60), kind) for kind in (pa.timestamp("us"), pa.duration("ms"), pa.decimal128(12))),
+    pa.array(["a"] * 60).dictionary_encode(),
+)  # fmt: skip
+"""Columns, each in the place of a good one, in files that know kinds of numbers."""
+
+
+def _parquet(file: io.BytesIO, table: Mapping[str, Any], compression: str = "snappy") -> None:
+    arrays = {n: y if isinstance(y, pa.Array) else pa.array(list(y)) for n, y in table.items()}
+    pq.write_table(pa.table(arrays), file, row_group_size=20, compression=compression)
+
+
 def tables_as(kind: str) -> list[bytes]:
     """Return the table as files of a kind, in its variants; all but `mat` have q, a matrix of two columns."""
     rows = np.array([[float(c) for c in line.split(",")] for line in CSV.splitlines()[1:]])
     plain = dict(zip(("t", "phi", "i", "load"), rows.T, strict=True))
-    columns = plain | {"q": rows[:, 1:3]}
-    texts = {name: y.tolist() for name, y in columns.items()}
+    columns: dict[str, Any] = plain | {"q": rows[:, 1:3]}
     if kind == "json":
+        texts = {name: y.tolist() for name, y in columns.items()}
         records = [dict(zip(texts, row, strict=True)) for row in zip(*texts.values(), strict=True)]
-        return [json.dumps(texts).encode(), json.dumps(records).encode()]
-    table = pa.table({name: pa.array(list(y)) for name, y in columns.items()})
+        return [json.dumps(texts).encode(), json.dumps(records).encode(), DEEP]
+    odd = [{**columns, ("i", "t", "q")[k % 3]: column} for k, column in enumerate(ODD)]
     whole = {"log": {**columns, "notes": "a bench"}, "spare": np.zeros(3)}
     writers: Mapping[str, Sequence[Callable[[io.BytesIO], object]]] = {
-        "npz": [lambda f: np.savez(f, **columns), lambda f: np.savez_compressed(f, **columns)],
-        "mat": [
-            lambda f: savemat(f, plain), lambda f: savemat(f, plain, do_compression=True),
-            lambda f: savemat(f, plain, format="4"),
-        ],
-        "struct": [lambda f: savemat(f, whole)],
-        "parquet": [
-            lambda f, codec=codec: pq.write_table(table, f, row_group_size=20, compression=codec)
-            for codec in ("snappy", "none")
-        ],
+        "npz": [lambda f: np.savez_compressed(f, **columns),
+                *(lambda f, table=table: np.savez(f, **table) for table in (columns, *odd))],
+        "mat": [partial(savemat, mdict=plain, **how)
+                for how in ({}, {"do_compression": True}, {"format": "4"})],
+        "struct": [partial(savemat, mdict=whole)],
+        "parquet": [partial(_parquet, table=columns, compression="none"),
+                    *(partial(_parquet, table=table) for table in (columns, *odd))],
     }  # fmt: skip
     files = []
     for write in writers[kind]:
         buffer = io.BytesIO()
-        write(buffer)
-        files.append(buffer.getvalue())
+        with suppress(TypeError, ValueError, pa.ArrowException):  # a format has not every kind of column
+            write(buffer)
+            files.append(buffer.getvalue())
     return files
 
 
@@ -148,16 +164,13 @@ def _bag(name: str, file: str = "") -> bytes:
         return (Path(folder) / name / file).read_bytes() if file else (Path(folder) / name).read_bytes()
 
 
-Verb = Callable[[Path, str, int], list[str]]
-"""In a folder, of a file and its number: the words of a call."""
-
-
 def read(
-    name: str, *readers: Callable[[Path], object], verb: Verb | None = None, often: bool = False
-) -> Play:
+    name: str, *readers: Callable[[Path], object], often: bool = False,
+    verb: Callable[[Path, str, int], list[str]] | None = None,
+) -> Play:  # fmt: skip
     """Return what writes a file of a name and calls readers with it; some go on into a verb.
 
-    often: every one that is accepted; else one in EVERY.
+    often: every one that is accepted; else one in EVERY. verb: in a folder, of a file and its number: words.
     """
 
     def play(folder: Path, data: bytes, number: int) -> Outcome:
@@ -202,21 +215,13 @@ def _play_metadata(folder: Path, data: bytes, number: int) -> Outcome:
     return try_readers(*(partial(reader, bag) for reader in BAG_READERS[:2]))
 
 
-def _units_verb(folder: Path, file: str, number: int) -> list[str]:
-    return ["design", "--catalogue", file, "--out", str(folder / "design")]
-
-
-def _page(file: Path) -> object:
-    return parse(file.read_bytes()).wrench((1, 2, 3, 4, 5, 6))
-
-
 PAGE = b"""<?xml version="1.0" encoding="utf-8"?><netft><cfgcpf>1000000</cfgcpf><cfgcpt>1000000</cfgcpt>
 <scfgfu>N</scfgfu><scfgtu>Nm</scfgtu><comrdtrate>7000</comrdtrate><cfgnam>bench</cfgnam></netft>"""
 BOMB = (b'<?xml version="1.0"?><!DOCTYPE x [<!ENTITY a "aaaaaaaaaa">' +
         b"".join(b'<!ENTITY %c "%s">' % (98 + k, b"&%c;" % (97 + k) * 10) for k in range(9)) +
         b"]><netft><cfgcpf>&j;</cfgcpf></netft>")  # fmt: skip
-
-
+BOMB_ZIP = gzip.compress(bytes(4_000_000)) * 100
+"""It unpacks to 400 MB."""
 NOISE = json.dumps({
     "schema": 1,
     **{n: dict.fromkeys(("ft", "position", "velocity", "motor_torque"), 0.01)
@@ -224,8 +229,8 @@ NOISE = json.dumps({
 }).encode()  # fmt: skip
 
 
-def _setting(name: str) -> bytes:
-    return f"{name}:{','.join(f'{k}={v}' for k, v in effects()[name].typical.items())}".encode()
+def _setting(effect: Effect) -> bytes:
+    return f"{effect.name}:{','.join(f'{k}={v}' for k, v in effect.typical.items())}".encode()
 
 
 def _play_setting(folder: Path, data: bytes, number: int) -> Outcome:
@@ -252,19 +257,22 @@ FORMATS = (
            read("rig.yaml", load_rig, verb=_rig_verb, often=True)),
     Format("map", lambda: list(map(str.encode, MAPS)), damage.in_yaml, play_import("run.csv", is_map=True)),
     Format("structs.mat", lambda: tables_as("struct"), damage.in_bytes, play_import("run.mat", STRUCTS)),
-    Format("npz", lambda: tables_as("npz"), damage.in_npz, play_import("run.npz", LISTED)),
-    Format("parquet", lambda: tables_as("parquet"), damage.in_parquet, play_import("run.parquet", LISTED)),
+    Format("npz", lambda: tables_as("npz"), damage.in_some, play_import("run.npz", LISTED)),
+    Format("parquet", lambda: tables_as("parquet"), damage.in_some, play_import("run.parquet", LISTED)),
     Format("json.table", lambda: tables_as("json"), damage.in_json, play_import("run.json", LISTED)),
     Format("csv", lambda: [CSV.encode()], damage.in_table, play_import("run.csv")),
     Format("tsv", lambda: [CSV.replace(",", "\t").encode()], damage.in_table, play_import("run.tsv")),
-    Format("csv.gz", lambda: [gzip.compress(CSV.encode())], damage.in_gzip, play_import("run.csv.gz")),
+    Format("csv.gz", lambda: [gzip.compress(CSV.encode()), BOMB_ZIP], damage.in_some,
+           play_import("run.csv.gz")),
     Format("mat", lambda: tables_as("mat"), damage.in_bytes, play_import("run.mat")),
     Format("catalogue", lambda: _files(rig_folders()[0].parent / "design", "motor_gear_units.yaml"),
-           damage.in_yaml, read("units.yaml", catalogue, verb=_units_verb)),
-    Format("calibration", lambda: [PAGE, BOMB], damage.in_bytes, read("page.xml", _page)),
-    Format("json", lambda: [NOISE], damage.in_json,
+           damage.in_yaml, read("units.yaml", catalogue, verb=lambda folder, file, _: [
+               "design", "--catalogue", file, "--out", str(folder / "design")])),
+    Format("calibration", lambda: [PAGE, BOMB], damage.in_bytes,
+           read("page.xml", lambda file: parse(file.read_bytes()).wrench((1, 2, 3, 4, 5, 6)))),
+    Format("json", lambda: [NOISE, DEEP], damage.in_json,
            read("identification.json", lambda file: noise_from(load_rig(RIG), str(file)))),
-    Format("effect", lambda: [_setting(name) for name in effects()], damage.in_setting, _play_setting),
+    Format("effect", lambda: list(map(_setting, effects().values())), damage.in_setting, _play_setting),
 )  # fmt: skip
 SHARES = {"mcap": 5, "sqlite": 3, "metadata": 2, "rig": 5, "map": 3, "csv": 3, "mat": 3}
 """Parts of all files; one part for a format that is not named here."""
@@ -281,7 +289,7 @@ def batches(seed: int, count: int, keep: Path | None) -> Iterator[tuple[str, Wor
 def _read_batch(
     form: Format, seed: int, keep: Path | None, folder: Path
 ) -> Iterator[tuple[str, Callable[[], Outcome]]]:
-    """Make and read the files of a batch."""
+    """Make and read the files of a batch; a copy stays where a promise was broken, or this process ends."""
     signal.signal(signal.SIGVTALRM, _stop)
     rng, seeds, answers = random.Random(seed), list(form.seeds()), dict[str, bytes]()
     for number in range(BATCH):
@@ -291,15 +299,19 @@ def _read_batch(
         data = base if sound else form.spoil(rng, base, rng.choice(seeds))
         name = f"{form.name} {seed} {number}"
         copy = (keep or folder) / name.replace(" ", "-")
-        yield name, partial(_read, form, folder, data, number, answers, copy)
+        copy.parent.mkdir(parents=True, exist_ok=True)
+        copy.write_bytes(data)
+        outcomes: list[Outcome] = []
+        yield name, partial(_read, form, folder, data, number, outcomes)
+        for outcome in outcomes:
+            pattern = re.sub(r"'[^']*'|\d+|\S*/\S*", "#", outcome.where or outcome.detail)[:120]
+            answers.setdefault(outcome.kind + pattern, data)
+            if not outcome.is_fault:
+                copy.unlink()
 
 
-def _read(
-    form: Format, folder: Path, data: bytes, number: int, answers: dict[str, bytes], copy: Path
-) -> Outcome:
-    """Read a file; its copy stays where a promise was broken, or this process ends."""
-    copy.parent.mkdir(parents=True, exist_ok=True)
-    copy.write_bytes(data)
+def _read(form: Format, folder: Path, data: bytes, number: int, outcomes: list[Outcome]) -> Outcome:
+    """Read a file within the ceilings; its outcome is noted, too."""
     limit_child(seconds=SLOW + 5)
     signal.setitimer(signal.ITIMER_VIRTUAL, SLOW)
     try:
@@ -311,10 +323,7 @@ def _read(
         limit_child(seconds=WALL)  # the next file may take long to make
     if "_TooSlow" in outcome.where:
         outcome.kind = "time-out"
-    pattern = re.sub(r"'[^']*'|\d+|\S*/\S*", "#", outcome.where or outcome.detail)[:120]
-    answers.setdefault(outcome.kind + pattern, data)
-    if not outcome.is_fault:
-        copy.unlink()
+    outcomes.append(outcome)
     return outcome
 
 

@@ -1,8 +1,8 @@
-"""The cases on which peers are compared, and their truth, which no peer sees.
+"""The cases on which programs are compared, and their truth, which none of them sees.
 
 Homes: `sea` and `sea, backlash` are the kind of machine that this project is made for, simulated by
-test/independent, which shares no code with it. `pendulum, BAM's friction` is BAM's home: its own law, by the
-very equations that its adapter fits. `black box` is nobody's physics. Silverbox and EMPS are other people's.
+test/independent, which shares no code with it. `pendulum, BAM's friction` is BAM's home: its own law, by its
+equations (second_order.py). EMPS is other people's.
 """
 
 from collections.abc import Callable, Mapping
@@ -12,16 +12,13 @@ from pathlib import Path
 import numpy as np
 from independent.bench import Bench, record_run
 from scipy.io import loadmat
-from scipy.signal import butter, lfilter
 
 from bench.peers.second_order import NAMES, simulate_run
 from rsea_ros.records.record import FloatArray
 
 NONE = np.zeros(0)
-SEA_VALUES = {"inertia": 0.957, "damping": 26.088, "stiffness": 1530.456, "spring_damping": 3.0}
-"""The rig paper_high_impedance as a joint: rotor and chassis, both dampers, the spring."""
 FINER = 16
-"""Steps of the pendulum's simulation in one of the adapters'."""
+"""Steps of the pendulum's simulation in one of second_order.py."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +31,6 @@ class PeerRecord:
     rate: float
     split: int
     physics: str
-    stated: Mapping[str, float]
     noise: float = float("nan")
     position: FloatArray = field(default_factory=lambda: NONE)
     velocity: FloatArray = field(default_factory=lambda: NONE)
@@ -42,19 +38,9 @@ class PeerRecord:
     cause: str = ""
 
     @property
-    def arrays(self) -> dict[str, object]:
-        """What a peer sees, but for meta: nothing measured from `split` on."""
-        hidden = {n: getattr(self, n).copy() for n in ("y", "position", "velocity")}
-        for y in hidden.values():
-            y[self.split :] = np.nan
-        return {"t": np.arange(len(self.u)) / self.rate, "u": self.u, "split": self.split, **hidden}
-
-    @property
-    def meta(self) -> dict[str, object]:
-        """Name, physics and stated values; torque, bias: typical sizes, of u and of an offset of y."""
-        train = self.y[: self.split]
-        sizes = {"torque": float(self.u.std()), "bias": 0.1 * float(train.std())}
-        return {"name": self.name, "physics": self.physics, "stated": dict(self.stated), **sizes}
+    def channel(self) -> str:
+        """The measured channel that y is."""
+        return "ft" if self.physics == "sea" else "position"
 
 
 def _sea(name: str, cause: str, **hidden: float) -> PeerRecord:
@@ -66,7 +52,7 @@ def _sea(name: str, cause: str, **hidden: float) -> PeerRecord:
     y, position, velocity = (np.array(record[n].y) for n in ("ft", "position", "velocity"))
     u = np.array(record["command"].y)
     split = 3 * len(u) // 4
-    return PeerRecord(name, u, y, 280.0, split, "sea", SEA_VALUES, 0.03, position, velocity, truth, cause)
+    return PeerRecord(name, u, y, 280.0, split, "sea", 0.03, position, velocity, truth, cause)
 
 
 def sea() -> PeerRecord:
@@ -82,7 +68,6 @@ def sea_backlash() -> PeerRecord:
 def pendulum() -> PeerRecord:
     """A pendulum with BAM's friction: Coulomb, Stribeck and load-dependent parts."""
     rate, n = 200.0, 4000
-    stated = {"inertia": 0.155, "damping": 0.05, "gravity": 3.0}
     truth = {"inertia": 0.165, "damping": 0.06, "gravity": 2.7}
     friction = {"friction": 0.25, "stribeck": 0.2, "stribeck_velocity": 0.3, "alpha": 1.35}
     friction |= {"load_motor": 0.08, "load_external": 0.12}
@@ -97,24 +82,7 @@ def pendulum() -> PeerRecord:
     velocity = np.gradient(q, 1.0 / rate) + 0.02 * rng.normal(size=n)
     y, noise = q + 5e-4 * rng.normal(size=n), 5e-4
     name, cause, split = "pendulum, BAM's friction", "friction", 3 * n // 4
-    return PeerRecord(name, u, y, rate, split, "joint", stated, noise, y, velocity, truth, cause)
-
-
-def black_box() -> PeerRecord:
-    """A filter, a saturating curve, a filter: no joint at all."""
-    rng = np.random.default_rng(6)
-    n = 3000
-    u = lfilter(*butter(2, 0.3), rng.normal(size=n))
-    inner = lfilter(*butter(2, 0.2), u) / 0.25
-    y = lfilter(*butter(1, 0.25), np.tanh(inner) + 0.2 * inner**2)
-    return PeerRecord("black box", u, y + 0.005 * rng.normal(size=n), 100.0, 2250, "none", {}, 0.005)
-
-
-def silverbox(data: Path) -> PeerRecord:
-    """The first 10 000 samples of the multisine of the training part; the last 2500 held out."""
-    path = data / "silverbox" / "SNLS80mV.csv"
-    u, y = np.genfromtxt(path, delimiter=",", skip_header=1, usecols=(0, 1), max_rows=50650)[40650:].T
-    return PeerRecord("silverbox", u.copy(), y.copy(), 1e7 / 2**14, 7500, "duffing", {})
+    return PeerRecord(name, u, y, rate, split, "joint", noise, y, velocity, truth, cause)
 
 
 def emps(data: Path) -> PeerRecord:
@@ -123,10 +91,9 @@ def emps(data: Path) -> PeerRecord:
     force = np.ravel(held["vir"]) * float(np.ravel(held["gtau"])[0])
     n = len(force) // 10
     u, y = force[: 10 * n].reshape(n, 10).mean(axis=1), np.ravel(held["qm"])[9 : 10 * n : 10].astype(float)
-    stated = {"inertia": 80.0, "damping": 150.0}
     published = {"inertia": 95.109, "damping": 203.503}
-    return PeerRecord("emps", u, y, 100.0, 1600, "drive", stated, position=y, truth=published)
+    return PeerRecord("emps", u, y, 100.0, 1600, "drive", position=y, truth=published)
 
 
-SIMULATED: tuple[Callable[[], PeerRecord], ...] = (sea, sea_backlash, pendulum, black_box)
-REAL: tuple[Callable[[Path], PeerRecord], ...] = (silverbox, emps)
+SIMULATED: tuple[Callable[[], PeerRecord], ...] = (sea, sea_backlash, pendulum)
+REAL: tuple[Callable[[Path], PeerRecord], ...] = (emps,)

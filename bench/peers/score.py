@@ -1,127 +1,101 @@
-"""Peers on the same records: each in its own environment, the same blocks, the same budget of processor time.
+"""This project on the records of docs/peers.md: `diagnose` on the training samples, then a free run.
 
-Runs every peer that has an environment (ENVS/NAME, PINS says with what) on every case and prints the table;
-results stay in OUT, and only missing ones are run again. What is compared, with
-which settings, and who is at home where: docs/peers.md.
+The rows of other programs there were played in environments made by hand, by what commit 906e2112 has.
 """
 
-import json
 import math
-import os
-import subprocess
-import sys
+import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import NamedTuple
 
 import numpy as np
 
 from bench.peers.cases import REAL, SIMULATED, PeerRecord
 from bench.results import Row
+from rsea_ros.diagnosis.diagnose import diagnose
+from rsea_ros.errors import RigError
+from rsea_ros.model.rig import Rig
+from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.simulation import simulate
+from rsea_ros.records.record import Channel, FloatArray, Record
 
-HERE = Path(__file__).resolve().parent
-PINS = {
-    "mujoco_sysid": "mujoco[sysid]==4.0.0 scipy==1.16.3",
-    "bam": "cma==4.5.0 numba==0.68.1 scipy==1.17.1",
-    "cma_pace": "cma==4.5.0 numba==0.68.1 scipy==1.17.1",
-    "sysidentpy": "sysidentpy==0.9.0",
-    "jax_sysid": "jax-sysid==1.1.0",
-    "pysindy": "pysindy==2.1.0",
-    "lstm": "torch==2.13.0 numpy==2.3.5",
-    "gp": "scikit-learn==1.9.1 scipy==1.16.3",
+RIG_OF = {"sea": "paper_high_impedance", "joint": "pendulum", "drive": "emps"}
+PARAMETERS = {
+    "inertia": ("rotor.reflected_inertia", "chassis.inertia", "spring_end.inertia"),
+    "damping": ("rotor.reflected_damping", "spring.damping", "spring_end.damping"),
+    "stiffness": ("spring.stiffness",),
+    "gravity": ("spring_end.gravity",),
 }
-"""By peer: the versions that were compared, for who makes its environment; nothing here installs them."""
-PEERS = {
-    "rsea": "with_rsea", "mujoco_sysid": "with_mujoco_sysid", "bam": "joints", "cma_pace": "joints",
-    **dict.fromkeys(("sysidentpy", "jax_sysid", "pysindy", "lstm", "gp"), "black_boxes"),
-}  # fmt: skip
-"""By peer: the module with a function of its name."""
-PATIENCE = 8.0
-"""Times the budget: wall seconds after which a peer is stopped; the machine may be busy with others."""
-DIVERGED = -1000.0
-"""Fit, %, below which a free run is said to diverge."""
+"""The sums of a rig's values that a value of a joint is."""
 
 
-def main(
-    *, peers: Annotated[tuple[str, ...], PEERS] = tuple(PEERS), cases: tuple[str, ...] = (),
-    realdata: Path | None = None, budget: float = 20.0, envs: Path = Path("out/peers/envs"),
-    out: Path = Path("out/peers"),
-) -> Iterator[Row]:  # fmt: skip
-    """Run what is missing, and print the table.
+class Result(NamedTuple):
+    """y from `split` on, the values that the rig states, the causes, the verdict."""
+
+    prediction: FloatArray
+    values: dict[str, float]
+    cause: str
+    note: str
+
+
+def main(*, cases: tuple[str, ...] = (), realdata: Path | None = None) -> Iterator[Row]:
+    """Play the cases, and print the table.
 
     cases: names of cases, all where none is named
-    realdata: folder with silverbox and emps; without it those cases are left out
-    budget: processor seconds for a fit; 0: run nothing, print the results so far
-    envs: environments
-    out: cases and results
+    realdata: folder with emps; without it that case is left out
     """
     made = [make() for make in SIMULATED] + [make(realdata) for make in REAL if realdata]
-    out.mkdir(parents=True, exist_ok=True)
     for case in (c for c in made if not cases or c.name in cases):
-        for peer in peers:
-            yield _row(peer, case, _result(peer, case, out, envs, budget))
+        started = time.process_time()
+        result = diagnosed(case)
+        yield row(case, result, time.process_time() - started)
 
 
-def _result(peer: str, case: PeerRecord, out: Path, envs: Path, budget: float) -> dict[str, Any]:
-    """Return the result of a peer, from its file if there is one."""
-    stem = f"{case.name.replace(' ', '_').replace(',', '').replace(chr(39), '')}"
-    target = out / f"{stem}.{peer}.json"
-    if target.exists():
-        return dict(json.loads(target.read_text(encoding="utf-8")))
-    python, reason = _python(peer, envs)
-    if reason or not budget:
-        return {"not_run": reason or "not yet"}
-    source = out / f"{stem}.npz"
-    np.savez(source, meta=json.dumps(case.meta), **case.arrays)  # type: ignore[arg-type]
-    command = [python, HERE / "common.py", f"{PEERS[peer]}:{peer}", source, target, str(budget)]
-    one_thread = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+def diagnosed(case: PeerRecord) -> Result:
+    """Diagnose the samples before `split` and predict those behind it."""
+    rig = load_rig(RIG_OF[case.physics])
+    rig = replace(rig, controller=None) if case.physics == "drive" else rig
+    result = diagnose([record_of(case, case.split)], rig)
+    run = simulate(result.extended_rig, record_of(case, len(case.u)))[case.channel]
+    values = {n: sum(_value(result.extended_rig, p) for p in parts) for n, parts in PARAMETERS.items()}
+    said = "; ".join(f"{c.name} ({c.status}, {c.probability:.2f})" for c in result.causes)
+    return Result(run[case.split :], {n: v for n, v in values.items() if v}, said, result.verdict)
+
+
+def _value(rig: Rig, name: str) -> float:
     try:
-        done = subprocess.run(
-            list(map(str, command)), env={**os.environ, **one_thread}, timeout=PATIENCE * budget,
-            capture_output=True, text=True, check=False,
-        )  # fmt: skip
-    except subprocess.TimeoutExpired:
-        return {"not_run": f"stopped after {PATIENCE * budget:g} s"}
-    if not target.exists():
-        lines = done.stderr.strip().splitlines() or [f"status {done.returncode}"]
-        return {"not_run": lines[-1][:120]}
-    return dict(json.loads(target.read_text(encoding="utf-8")))
+        return float(rig[name])
+    except RigError:  # this rig has no such part
+        return 0.0
 
 
-def _python(peer: str, envs: Path) -> tuple[Path, str]:
-    """Return the interpreter of a peer's environment, or why there is none."""
-    python = Path(sys.executable) if peer == "rsea" else (envs / peer / "bin" / "python").absolute()
-    return python, "" if python.exists() else f"no environment {envs / peer}, expected one with {PINS[peer]}"
+def record_of(case: PeerRecord, n: int) -> Record:
+    """Return the first n samples: a command at the beginning of its period, measurements at its end, nothing
+    measured from `split` on."""
+    starts = np.arange(n) / case.rate
+    channels = {"command": Channel(starts, case.u[:n])}
+    if case.physics != "sea":
+        channels["motor_torque"] = Channel(starts, case.u[:n])
+    for name, y in {"position": case.position, "velocity": case.velocity, case.channel: case.y}.items():
+        if y.size:
+            channels[name] = Channel(starts + 1.0 / case.rate, y[:n] if n == case.split else np.zeros(n))
+    return Record(channels, case.name)
 
 
-def _row(peer: str, case: PeerRecord, result: dict[str, Any]) -> Row:
-    columns = ("residual / noise", "fit, %", "values off, %", "cause", "s", "note")
-    if "not_run" in result:
-        texts = (f"not run: {_cell(result['not_run'])}", *[""] * 5)
-    else:
-        error = np.array(result["prediction"]) - case.y[case.split :]
-        rms = float(np.sqrt(np.mean(error**2)))
-        fit = 100.0 * (1.0 - rms / float(case.y[case.split :].std()))
-        texts = (
-            _number(rms / case.noise), _number(fit) if fit > DIVERGED else "diverges",
-            _number(_values_off(case, result)), _cell(result["cause"] or "none named"),
-            f"{result['seconds']:.1f}", _cell(result["note"]),
-        )  # fmt: skip
-    return Row(case.name, "", {"peer": peer, **dict(zip(columns, texts, strict=True))})
-
-
-def _values_off(case: PeerRecord, result: dict[str, Any]) -> float:
-    """Return the RMS relative error of the true values that a peer states, %; not a number for none."""
-    pairs = [(result["parameters"][n], v) for n, v in case.truth.items() if n in result["parameters"]]
-    errors = [float(value) / true - 1.0 for value, true in pairs]
-    return 100.0 * math.sqrt(sum(e**2 for e in errors) / len(errors)) if errors else math.nan
+def row(case: PeerRecord, result: Result, seconds: float) -> Row:
+    """Return the row of a result."""
+    held_out = case.y[case.split :]
+    rms = float(np.sqrt(np.mean((result.prediction - held_out) ** 2)))
+    off = [result.values[n] / true - 1.0 for n, true in case.truth.items() if n in result.values]
+    return Row(case.name, "", {
+        "peer": "rsea", "residual / noise": _number(rms / case.noise),
+        "fit, %": _number(100.0 * (1.0 - rms / float(held_out.std()))),
+        "values off, %": _number(100.0 * float(np.sqrt(np.mean(np.square(off)))) if off else math.nan),
+        "cause": result.cause or "none named", "s": f"{seconds:.1f}", "note": result.note,
+    })  # fmt: skip
 
 
 def _number(value: float) -> str:
-    if not math.isfinite(value):
-        return "–"
-    return f"{value:.3g}" if not 1e3 <= abs(value) < 1e6 else f"{value:.0f}"
-
-
-def _cell(text: str) -> str:
-    return " ".join(str(text).replace("|", "/").split())
+    return f"{value:.3g}" if math.isfinite(value) else "–"

@@ -131,7 +131,7 @@ class ErrorSettings:
     which none is said.
 
     With less window or hysteresis noise whose share is the tolerance changes the verdict more than once a
-    second (python -m bench observer flag).
+    second (decision 386 has the figures).
     """
 
     tolerance: float = 0.3

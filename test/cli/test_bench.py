@@ -6,22 +6,17 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Annotated
 
-import numpy as np
 import pytest
 import yaml
 
 from bench.__main__ import _parser, _print, index, main as run_bench
-from bench.experiment.score import LIMITS, Fixed
 from bench.frozen.cases import generated
 from bench.mutants import calls as callers
 from bench.results import read_lines, resumed, write_pages
 from rsea_ros.cli.launch import node_calls
 from rsea_ros.errors import DeviceError
-from rsea_ros.experiment.campaign import Campaign
-from rsea_ros.experiment.proposal import DesignRequest
 from rsea_ros.hardware.peer.remote import RemoteBench
 from rsea_ros.model.rig_file import load_rig, rig_folders
 from test.nodes.warm import Bench
@@ -178,11 +173,3 @@ def test_a_long_test_leaves_room_for_the_shorter_ones_behind_it(monkeypatch):
     assert callers.tests_of("laws/source", "f") == ([near, short], [])
     seconds[long] = 29.0
     assert callers.tests_of("laws/source", "f") == ([near, long], [])
-
-
-def test_a_piece_of_a_fixed_command_is_a_run_of_a_campaign():
-    possible = [SimpleNamespace(name="nothing", probability=0.5)]
-    piece = Fixed(np.full(5600, 1.5), 2.0)(possible, None, None, None, None)
-    campaign = Campaign(load_rig("paper_high_impedance"), (), DesignRequest(LIMITS["lab"]), play=None)
-    assert campaign._is_worth(piece, [piece])
-    assert piece.peaks.at_level["torque"] == pytest.approx(1.5)

@@ -1,53 +1,26 @@
-"""The comparison with peers: what a peer's script gets to see, and how its result becomes a row."""
-
-from __future__ import annotations
+"""The comparison with other programs: what is held out, and how a result becomes a row."""
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from bench.peers import score as peers
 from bench.peers.cases import PeerRecord
+from bench.peers.score import Result, record_of, row
 
-HERE = Path(peers.__file__).parent
-
-
-@pytest.fixture(scope="module")
-def case():
-    y = np.sin(np.arange(40.0))
-    truth = {"inertia": 2.0, "damping": 4.0}
-    return PeerRecord(
-        "a case", np.ones(40), y, 10.0, 30, "joint", {"inertia": 1.0}, 0.5, y, np.zeros(0), truth
-    )
+Y = np.sin(np.arange(40.0))
+CASE = PeerRecord("a case", np.ones(40), Y, 10.0, 30, "joint", 0.5, Y, truth={"inertia": 2.0, "damping": 4.0})
 
 
-def test_a_peer_gets_no_measurement_that_is_held_out(case):
-    arrays = case.arrays
-    for name in ("y", "position"):
-        assert np.isnan(arrays[name][30:]).all() and np.isfinite(arrays[name][:30]).all()
-    assert np.isfinite(case.y).all() and arrays["velocity"].size == 0
-    assert "truth" not in str(case.meta) and "cause" not in case.meta
+def test_a_record_has_no_measurement_that_is_held_out():
+    known, whole = record_of(CASE, 30), record_of(CASE, 40)
+    assert np.array_equal(known["position"].y, Y[:30]) and "velocity" not in known
+    assert not whole["position"].y.any() and whole["command"].y.all()
 
 
-def test_a_result_becomes_a_row(case):
-    parameters = {"inertia": 2.2, "damping": 4.0}
-    result = {
-        "prediction": list(case.y[30:] + 1.0), "parameters": parameters, "cause": "", "note": "a|b",
-        "seconds": 1.24,
-    }  # fmt: skip
-    _, cells = peers._row("gp", case, result).cells()
-    fit = 100.0 * (1.0 - 1.0 / case.y[30:].std())
-    off = f"{10.0 / math.sqrt(2.0):.3g}"
-    assert cells == ("a case", "gp", "2", f"{fit:.3g}", off, "none named", "1.2", "a/b")
-
-
-def test_a_peer_that_did_not_run_is_a_row_with_the_reason(case):
-    assert "not run: no / wheel" in peers._row("gp", case, {"not_run": "no | wheel"}).cells()[1]
-
-
-def test_every_peer_has_a_script_and_pinned_requirements():
-    scripts = {peer: (HERE / f"{module}.py").read_text() for peer, module in peers.PEERS.items()}
-    assert [peer for peer, script in scripts.items() if f"\ndef {peer}(" not in script] == []
-    assert all("==" in pin for pins in peers.PINS.values() for pin in pins.split())
+def test_a_result_becomes_a_row():
+    result = Result(Y[30:] + 1.0, {"inertia": 2.2, "damping": 4.0, "stiffness": 1.0}, "", "explained")
+    cells = row(CASE, result, 1.24).measured
+    assert float(cells["fit, %"]) == pytest.approx(100.0 * (1.0 - 1.0 / Y[30:].std()), rel=5e-3)
+    assert cells["residual / noise"] == "2" and cells["values off, %"] == f"{10.0 / math.sqrt(2.0):.3g}"
+    assert (cells["cause"], cells["s"], cells["note"]) == ("none named", "1.2", "explained")
