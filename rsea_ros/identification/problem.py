@@ -12,7 +12,7 @@ import numpy as np
 from rsea_ros.errors import IdentificationError
 from rsea_ros.identification.noise import least_noise, noise_floor
 from rsea_ros.identification.unknowns import Clocks, Unknown, apply
-from rsea_ros.model.drive import Drive, outside_gaps, zero_unknown
+from rsea_ros.model.drive import Drive, LoadStart, SpringStart, outside_gaps, zero_unknown
 from rsea_ros.model.extent import SKIPPED_START
 from rsea_ros.model.inverse import Motion, acting_torque, is_inverse, motion_from, noise_along, torques_along
 from rsea_ros.model.position_loop import with_command
@@ -323,15 +323,27 @@ _SAME = 1e-3
 
 
 def _other_starts(drive: Drive, noise: Mapping[str, float]) -> Iterator[Drive]:
-    """Yield a drive from states that are off by what its sensors' noise shows."""
-    q, w = drive.initial
-    off = noise.get("position", OFF)
-    yield replace(drive, initial=(q + off, w))
-    yield replace(drive, initial=(q, w + off / APART))
-    if spring := drive.spring:
+    """Yield a drive from states, at its start and behind gaps, off by what its sensors' noise shows."""
+    for motion, spring in _near(drive.initial, drive.spring, noise):
+        yield replace(drive, initial=motion, spring=spring)
+    for i, (k, state) in enumerate(drive.restarts):
+        if not isinstance(state, LoadStart):
+            continue
+        for motion, spring in _near((state.position, state.velocity), state.spring, noise):
+            anew = k, LoadStart(*motion, spring or state.spring)
+            yield replace(drive, restarts=(*drive.restarts[:i], anew, *drive.restarts[i + 1 :]))
+
+
+def _near(
+    motion: tuple[float, float], spring: SpringStart | None, noise: Mapping[str, float]
+) -> Iterator[tuple[tuple[float, float], SpringStart | None]]:
+    (q, w), off = motion, noise.get("position", OFF)
+    yield (q + off, w), spring
+    yield (q, w + off / APART), spring
+    if spring is not None:
         off = noise[spring.channel]
-        yield replace(drive, spring=spring._replace(value=spring.value + off))
-        yield replace(drive, spring=spring._replace(rate=spring.rate + off / APART))
+        yield motion, spring._replace(value=spring.value + off)
+        yield motion, spring._replace(rate=spring.rate + off / APART)
 
 
 OFF = 1e-4
