@@ -98,7 +98,7 @@ COMPUTING = (
 
 
 TOGETHER = {
-    "test/report": ("test/report/",),
+    "test/report": ("test/report/", "test/extras/pages/test_in_browser"),
     "test/test_house": ("test/test_house", "test/test_imports", "test/test_fault_", "test/test_compiler_"),
 }
 """Files that one worker takes as one: what the first makes, or reads of every source, the others need."""
