@@ -15,6 +15,7 @@ from pathlib import Path
 
 import hypothesis
 import pytest
+from hypothesis.internal.conjecture import providers
 from xdist.remote import Producer
 from xdist.scheduler import LoadFileScheduling
 from xdist.workermanage import WorkerController
@@ -34,6 +35,8 @@ if sys.dont_write_bytecode:  # pytest would rewrite 3000 asserts in each worker,
 
 hypothesis.settings.register_profile("rsea", deadline=None, derandomize=True, database=None)
 hypothesis.settings.load_profile("rsea")
+# Else examples have numbers of the modules that a worker happens to have loaded, and each parses all of them.
+providers._get_local_constants = providers.Constants
 
 
 def _take_domain() -> int:
