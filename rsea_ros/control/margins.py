@@ -7,6 +7,7 @@ w_d is the speed of the distal side, w that of the gear, a and b the law's actio
 the bench without motor torque. A motor at rest leaves the spring: Z_s = K_s / s + b_s.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -118,19 +119,17 @@ def link_response(
 
 
 def returns(
-    law: FeedbackLaw,
-    plant: ComplexArray,
-    hz: FloatArray,
-    path: ComplexArray | float = 1.0,
-    current: ComplexArray | float = 1.0,
-) -> tuple[ComplexArray, ComplexArray]:
+    law: FeedbackLaw, plant: ComplexArray, hz: FloatArray, path: ComplexArray | float = 1.0,
+    current: ComplexArray | float = 1.0, acted: Sequence[ComplexArray] = (),
+) -> tuple[ComplexArray, ComplexArray]:  # fmt: skip
     """Return the loop's memory N and D = N + the rest of the loop, shape (…, n): L = D / N - 1.
 
     plant: of `responses`, without the path; shape (4, …, n). path, current: from a command to the motor
     torque and to its measurement, beyond the one sample that is always present. N is 1 less the torque
     that is fed back; N / D is the sensitivity to a torque on the gear, 1 / D that to one on the command.
+    acted: the `actions`, where they are known.
     """
-    on_ft, on_velocity, memory = actions(law, hz)
+    on_ft, on_velocity, memory = acted or actions(law, hz)
     back = 1.0 / z_of(law.period, hz)
     fed_back = 1.0 - back * current * memory
     whole = fed_back + back * path * (on_ft * plant[FT] + on_velocity * plant[VELOCITY])
@@ -186,10 +185,10 @@ class Moved:
 
     def impedance(self, law: FeedbackLaw, on_link: ComplexArray | float = 0.0) -> ComplexArray:
         """Return T / w_d under a law, N m s/rad, shape (n,). on_link: of `linked`, N m/rad."""
-        on_ft, on_velocity, _ = actions(law, self.hz)
+        on_ft, on_velocity, _ = acted = actions(law, self.hz)
         sensed = self.plant.copy()
         sensed[FT] *= self.sensor
-        _, whole = returns(law, sensed, self.hz, self.path, self.current)
+        _, whole = returns(law, sensed, self.hz, self.path, self.current, acted)
         commanded = (on_ft * self.sensor * self.torque + on_velocity * self.speed) / z_of(law.period, self.hz)
         commanded = commanded - on_link / (2j * np.pi * self.hz)
         opposed: ComplexArray = self.torque - self.plant[FT] * self.path * commanded / whole

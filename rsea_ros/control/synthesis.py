@@ -20,14 +20,14 @@ and Mead's in the logarithms of the gains; then the poles of the closed loop, ta
 decide whether the design is let through.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
 from scipy.optimize import minimize
 
-from rsea_ros.control.law import FT, VELOCITY, FeedbackLaw, Gains, law_of, sample_rig
+from rsea_ros.control.law import FT, VELOCITY, Gains, law_of, sample_rig
 from rsea_ros.control.margins import (
     Margins,
     Moved,
@@ -232,7 +232,8 @@ def _problem(
 
 def _score(problem: SynthesisProblem, gains: Gains) -> RobustnessScore:
     law, f, moved = law_of(problem.rig, problem.rate, gains), problem.family, problem.moved
-    memory, whole = returns(law, f.plant, f.hz, f.path, f.current)
+    acted = actions(law, f.hz)
+    memory, whole = returns(law, f.plant, f.hz, f.path, f.current, acted)
     sensitivity = (np.maximum(np.abs(memory), 1.0) / np.abs(whole)).max(axis=1)
     locked = np.array([case.load == LOCKED and case.samples == 0 for case in f.cases])
     slow = (f.hz >= HUNTED) & (f.hz < 0.25 * problem.rate)
@@ -245,13 +246,13 @@ def _score(problem: SynthesisProblem, gains: Gains) -> RobustnessScore:
         encirclements(whole),
         np.abs(opposed / moved.spring),
         max(turned, float(speed.max()) - HUNTING),
-        _noise(problem, law, whole[0]),
+        _noise(problem, acted, whole[0]),
     )
 
 
-def _noise(problem: SynthesisProblem, law: FeedbackLaw, whole: ComplexArray) -> float:
+def _noise(problem: SynthesisProblem, acted: Sequence[ComplexArray], whole: ComplexArray) -> float:
     """Return the RMS of what the sensors' noise makes of the command, N m: white up to half the rate."""
-    on_ft, on_velocity, _ = actions(law, problem.family.hz)
+    on_ft, on_velocity, _ = acted
     levels = [sensor.level if (sensor := problem.rig.sensors.get(c)) else 0.0 for c in ("ft", "velocity")]
     power = (np.abs(on_ft) * levels[0]) ** 2 + (np.abs(on_velocity) * levels[1]) ** 2
     return float(np.sqrt(2.0 * np.trapezoid(power / np.abs(whole) ** 2, problem.family.hz) / problem.rate))

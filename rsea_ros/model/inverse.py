@@ -98,7 +98,7 @@ class Motion:
         """
         period, torque = float(self.t[1] - self.t[0]), torque.copy()
         for part in self.parts:
-            torque[part] = _behind_corner(torque[part], self.corner, period)
+            torque[part] = smooth(torque[part], period, self.corner, 1)
         return torque
 
     def with_noise(self, rig: Rig, white: Mapping[str, float]) -> Motion:
@@ -113,14 +113,6 @@ _SLOWEST = 4.0
 """Hz. A lower corner would remember longer than half a block of a quarter of a second, judged by itself."""
 _TORQUE_TRUST = 0.01
 """Of a torque's RMS: a smaller error of the slow torque is not worth the fast ones."""
-
-
-def _behind_corner(values: FloatArray, corner: float, period: float) -> FloatArray:
-    from scipy.signal import butter, filtfilt
-
-    if math.isinf(corner):
-        return values
-    return np.asarray(filtfilt(*butter(1, min(corner * 2.0 * period, 0.8)), values))
 
 
 def is_inverse(rig: Rig) -> bool:
@@ -320,11 +312,20 @@ def _torque_at(record: Record, t: FloatArray) -> FloatArray:
     return np.asarray(torque.y[np.minimum(shown, len(torque) - 1)].mean(axis=0), np.float64)
 
 
-def smooth(values: FloatArray, period: float) -> FloatArray:
-    """Return values behind the Butterworth filter, run both ways. period: s, between samples."""
-    from scipy.signal import butter, filtfilt
+def smooth(values: FloatArray, period: float, corner: float = CUT_OFF, order: int = 4) -> FloatArray:
+    """Return values behind a Butterworth filter (Hz), run both ways. period: s, between samples."""
+    from scipy.signal import filtfilt
 
-    return np.asarray(filtfilt(*butter(4, min(CUT_OFF * 2.0 * period, 0.8)), values))
+    if math.isinf(corner):
+        return values
+    return np.asarray(filtfilt(*_butterworth(order, min(corner * 2.0 * period, 0.8)), values))
+
+
+@lru_cache(maxsize=64)  # each takes half as long as filtering a record, and a fit asks for it again and again
+def _butterworth(order: int, corner: float) -> tuple[FloatArray, ...]:
+    from scipy.signal import butter
+
+    return tuple(butter(order, corner))
 
 
 def noise_along(rig: Rig, motion: Motion) -> dict[str, float]:
@@ -334,7 +335,7 @@ def noise_along(rig: Rig, motion: Motion) -> dict[str, float]:
     """
     period = float(motion.t[1] - motion.t[0])
     h = filtered_noise(period)
-    slow = _behind_corner(h, motion.corner, period)
+    slow = smooth(h, period, motion.corner, 1)
     white = {n: motion.white.get(n, 0.0) for n in _FILTERED}
     own = {n: white[n] * math.hypot(*x[0]) for n, x in (("motor_torque", slow), ("ft", h))}
     load = {"motor_torque": 0.0, "ft": 0.0}
@@ -361,8 +362,7 @@ def filtered_noise(period: float) -> FloatArray:
 
     reach = max(FEWEST, math.ceil(SKIPPED_START / period))
     finer = max(1, math.ceil(period / FINE))
-    one = np.zeros(2 * reach + 1)
-    one[reach] = 1.0
+    one = np.eye(1, 2 * reach + 1, reach)[0]
     at = np.arange(len(one)) * period
     step = period / finer
     q = smooth(CubicSpline(at, one)(np.arange(2 * reach * finer + 1) * step), step)

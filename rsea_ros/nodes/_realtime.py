@@ -16,8 +16,8 @@ from rsea_ros.nodes._parameters import NodeParameter
 
 SET_TIMER_SLACK = 29
 """Of Linux' prctl."""
-SWITCH_INTERVAL = 1e-5
-"""s after which a thread of Python must let another one in."""
+SWITCH_INTERVAL = 5e-5
+"""s after which a thread of Python must let another one in: each that waits looks for it as often (373)."""
 PROCESSORS = os.sched_getaffinity(0)
 """That this process may run on."""
 _timed: dict[int, int] = {}

@@ -265,11 +265,6 @@ def test_values_that_stop_are_a_fault_until_they_change():
     assert not sensor.stopped and sensor.take(records([9] * 40, start=2000 * MS)) == ""
 
 
-def test_a_sensor_without_noise_may_stand_still():
-    sensor = stillness([7] * 100)
-    assert sensor.take(records([7] * 5000)) == "" and sensor.reason(records([7] * 100)) == ""
-
-
 GOOD = (
     b"<?xml version='1.0'?><netft><cfgcpf>1000000</cfgcpf><cfgcpt>1000</cfgcpt>"
     b"<scfgfu>N</scfgfu><scfgtu>N-mm</scfgtu><comrdtrate>7000</comrdtrate></netft>"

@@ -19,7 +19,9 @@ from rsea_ros.nodes._health import ERROR, OK, WARN, NodeHealth
 from rsea_ros.nodes._joint import DrivenJoint, _hardware, stop
 from rsea_ros.nodes.joint import compose
 from test.nodes.conftest import ROOT, as_argument, setting
+from test.nodes.stalls import until
 from test.nodes.torque_loop import GAINS, Loop
+from test.nodes.warm import parent
 
 LARGEST = 250e6
 """B that driver, controller and model of a joint may take together; as three processes they took 600."""
@@ -132,19 +134,17 @@ def test_one_signal_ends_all_of_them_at_zero_torque(joint, listener):
     listener.until(lambda: torque(joint) == 0.0)
 
 
-def test_a_driver_is_made_last_in_whatever_order_they_are_named():
+def test_a_driver_is_made_last_in_whatever_order_they_are_named(tmp_path):
     """Named after the controller it was active while that designed its gains, and heard no stop."""
     words = [w for key, value in GIVEN.items() for w in ("-p", f"{key}:={as_argument(value)}")]
-    words += ["-r", "__ns:=/last"]
-    command = [sys.executable, "-m", "rsea_ros.nodes.joint", "controller", "driver", "--ros-args", *words]
-    made = subprocess.Popen(command, env={**os.environ, "PYTHONPATH": str(ROOT)}, stderr=subprocess.PIPE)
-    told = []
-    while len(told) < 2:
-        line = made.stderr.readline()
-        told += [word for word in (b"tolerated: ", b"limits: ") if word in line]
+    words = ["controller", "driver", "--ros-args", *words, "-r", "__ns:=/last"]
+    (log := tmp_path / "log").touch()
+    made = parent().start("rsea_ros.nodes.joint", words, dict(os.environ), (os.devnull, log, log))
+    until(lambda: "limits: " in log.read_text() and "tolerated: " in log.read_text())
     made.send_signal(signal.SIGINT)
-    assert made.communicate() and made.returncode == 0
-    assert told == [b"tolerated: ", b"limits: "]
+    assert made.wait() == 0
+    said = log.read_text()
+    assert said.index("tolerated: ") < said.index("limits: ")
 
 
 def test_nodes_are_made_in_a_process_and_executor_of_ones_own(listener):
