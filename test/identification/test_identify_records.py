@@ -164,7 +164,8 @@ def test_stamps_at_which_a_sensor_did_measure_or_a_command_did_act_stay_however_
     result = identify([resample(true, record, stamps, 10)], nominal)
     assert result.remarks == ()
     agree(result, true)
-    sent = Channel(record["command"].t + rng.uniform(-3e-4, 3e-4, len(record["command"])), record["command"].y)
+    t = record["command"].t
+    sent = Channel(t + rng.uniform(-3e-4, 3e-4, len(t)), record["command"].y)
     acted = resample(true, record.with_channels(command=sent), {n: record[n].t for n in stamps}, 10)
     assert not with_even_clocks([acted], [{}], nominal).scatter
 
