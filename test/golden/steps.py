@@ -350,3 +350,6 @@ SCRIPTS: dict[str, Callable[[Path], Iterator[str]]] = {
     "written_laws": written_laws,
 }  # fmt: skip
 """What no line of the command line shows."""
+
+DECLARED = {"lists", "effects", "helps", "nodes", "terms_of_laws", "settings"}
+"""Steps that show what is declared: 0.015 for 0.01 is no rounding there."""
