@@ -49,7 +49,7 @@ VERBS: dict[str, tuple[str, ...]] = {
     "controlled": (f"control {RIG} --rate 75 --out controlled",),
     "paper": ("paper --duration 20 --out paper",),
     "exported": tuple(
-        f"export --{kind} diagnosed/model.yaml --out exported{name}"
+        f"export --{kind} diagnosed/model.yaml --out exported{name}{' --json' * (kind == 'sdf')}"
         for kind, name in zip(
             ("mjcf", "urdf", "sdf", "fmu", "isaac", "bam", "feedforward"),
             ("0.mjcf", "1.urdf", "2.sdf", "3.fmu", "4.isaac", "5.bam", "6.h"), strict=True,
@@ -350,3 +350,6 @@ SCRIPTS: dict[str, Callable[[Path], Iterator[str]]] = {
     "written_laws": written_laws,
 }  # fmt: skip
 """What no line of the command line shows."""
+
+DECLARED = {"lists", "effects", "helps", "nodes", "terms_of_laws", "settings"}
+"""Steps that show what is declared: 0.015 for 0.01 is no rounding there."""

@@ -267,10 +267,14 @@ def _fields(message: object, at: str = "") -> Iterator[tuple[str, float]]:
             yield from _fields(value, f"{at}{name}.")
 
 
-def differences(stored: str, said: str, *, limit: int = 20) -> list[str]:
-    """Return lines that differ in words, or in a number by more than rounding allows, up to a limit."""
+def differences(stored: str, said: str, *, exact: bool = False, limit: int = 20) -> list[str]:
+    """Return lines that differ in words, or in a number by more than rounding allows, up to a limit.
+
+    exact: no number is computed, so none may differ.
+    """
     before, now = stored.splitlines(), said.splitlines()
-    found = [f"  {a}\n→ {b}" for a, b in zip(before, now, strict=False) if a != b and not _alike(a, b)]
+    apart = [(a, b) for a, b in zip(before, now, strict=False) if a != b and (exact or not _alike(a, b))]
+    found = [f"  {a}\n→ {b}" for a, b in apart]
     if len(before) != len(now):
         found.append(f"  {len(before)} lines\n→ {len(now)} lines")
     return found[:limit]

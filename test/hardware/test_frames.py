@@ -6,6 +6,7 @@ import random
 import select
 import time
 import tty
+from collections import Counter
 from contextlib import suppress
 
 import pytest
@@ -219,6 +220,8 @@ def test_a_reply_during_the_reading_is_a_late_acknowledgement(during_write, duri
         motor.write(1.0)
     begun = time.monotonic_ns()
     assert motor.read().instant >= begun and motor.acknowledged_late is late
+    counted = {"lost": not during_write, "stale": during_read.count(WRITTEN)}
+    assert motor.bus.errors == Counter(counted)
     motor.write(1.0)
     motor.read()
     assert motor.acknowledged_late is False

@@ -8,7 +8,7 @@ from benches import bench, record_bench
 from runs import RATE, RIG
 
 from rsea_ros.errors import IdentificationError
-from rsea_ros.identification.fit import even_clock
+from rsea_ros.identification.fit import even_clock, with_even_clocks
 from rsea_ros.identification.identify import identify
 from rsea_ros.model.rig import PositionLoop
 from rsea_ros.model.simulation import measure, simulate
@@ -157,13 +157,17 @@ def test_stamps_of_commands_that_scatter_are_put_on_an_even_clock(case):
     agree(result, true)
 
 
-def test_stamps_at_which_a_sensor_did_measure_stay_however_they_scatter(case):
+def test_stamps_at_which_a_sensor_did_measure_or_a_command_did_act_stay_however_they_scatter(case):
     nominal, true, record = case
     rng = np.random.default_rng(10)
     stamps = {n: record[n].t + rng.uniform(0.0, 6e-4, len(record[n])) for n in ("ft", "position", "velocity")}
     result = identify([resample(true, record, stamps, 10)], nominal)
     assert result.remarks == ()
     agree(result, true)
+    t = record["command"].t
+    sent = Channel(t + rng.uniform(-3e-4, 3e-4, len(t)), record["command"].y)
+    acted = resample(true, record.with_channels(command=sent), {n: record[n].t for n in stamps}, 10)
+    assert not with_even_clocks([acted], [{}], nominal).scatter
 
 
 @pytest.mark.parametrize("rate", [280.0, 1000.0, 2000.0])

@@ -219,6 +219,16 @@ def test_what_becomes_of_a_command_that_changes_within_a_step_is_known_there_too
     assert np.mean(off) < 0.005
 
 
+def test_a_late_command_beyond_a_limit_is_that_of_the_limit_late():
+    """Between two held values the mean of a step is within the limit that both exceed."""
+    t, command = np.cumsum(np.random.default_rng(3).uniform(0.9, 1.1, 400)) / RATE, 3.5 * white(400)
+    rig = load_rig("paper_moving_output").with_effect("command_delay", delay=0.4 / RATE)
+    ours = simulate(rig.with_effect("torque_saturation", limit=2.6), record_of(t, command, t[5:]))
+    theirs = simulate(rig, record_of(t, np.clip(command, -2.6, 2.6), t[5:]))
+    for channel in SIGNALS:
+        np.testing.assert_allclose(ours[channel], theirs[channel], atol=1e-9)
+
+
 @pytest.mark.parametrize("hold", ["zero", "first"])
 def test_a_finer_drive_is_that_of_the_record_on_half_the_step(hold):
     dice = np.random.default_rng(5)
