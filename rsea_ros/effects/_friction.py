@@ -17,6 +17,13 @@ from rsea_ros.compiler import njit
 from rsea_ros.effects.effect import AgainstMotion, Parameter, Parameters
 from rsea_ros.effects.signal_table import CREEP, GEAR_VELOCITY, GEAR_VELOCITY_SPAN, MOBILITY
 
+
+def friction_torque(name: str, typical: float) -> Parameter:
+    """Return the parameter of a friction torque, N m."""
+    reason = "friction above the largest torque would hold the machine still"
+    return Parameter(name, "N m", null=0.0, low=0.0, high=50.0, typical=typical, reason=reason)
+
+
 PRESLIDING = Parameter(
     "creep_velocity", "rad/s", null=2e-3, low=1e-5, high=2e-2, typical=2e-3, logarithmic=True, optional=True,
     ideal_at_low=True,

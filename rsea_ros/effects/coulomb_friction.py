@@ -7,8 +7,8 @@ see _friction.py. Source: Armstrong-Helouvry, Control of Machines with Friction,
 """
 
 from rsea_ros.compiler import njit
-from rsea_ros.effects._friction import PRESLIDING, against, mean_friction
-from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
+from rsea_ros.effects._friction import PRESLIDING, against, friction_torque, mean_friction
+from rsea_ros.effects.effect import Claims, Effect, compiled
 from rsea_ros.effects.signal_table import GEAR_TORQUE, GEAR_VELOCITY, Port
 
 
@@ -29,10 +29,7 @@ EFFECT = Effect(
     name="coulomb_friction",
     port=Port.GEAR,
     parameters=(
-        Parameter(
-            "torque", "N m", null=0.0, low=0.0, high=50.0, typical=2.0,
-            reason="friction above the largest torque would hold the machine still",
-        ),
+        friction_torque("torque", 2.0),
         PRESLIDING,
     ),
     claims=Claims(

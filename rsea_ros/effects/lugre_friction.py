@@ -10,6 +10,7 @@ IEEE Trans. Autom. Control 40, 1995, eqs. (1) to (4).
 
 import math
 
+from rsea_ros.effects._friction import friction_torque
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
 from rsea_ros.effects.signal_table import GEAR_TORQUE, GEAR_VELOCITY, STEP, Port
 from rsea_ros.effects.spring_hysteresis import reach
@@ -35,19 +36,13 @@ EFFECT = Effect(
     name="lugre_friction",
     port=Port.GEAR,
     parameters=(
-        Parameter(
-            "coulomb_torque", "N m", null=0.0, low=0.0, high=50.0, typical=2.0,
-            reason="friction above the largest torque would hold the machine still",
-        ),
+        friction_torque("coulomb_torque", 2.0),
         Parameter(
             "bristle_stiffness", "N m/rad", null=0.0, low=50.0, high=1e5, typical=2500.0, starts=(500.0, 1e4),
             logarithmic=True,
             reason="from a thirtieth of the spring's to seventy times it; stiffer is Coulomb friction",
         ),
-        Parameter(
-            "stribeck_torque", "N m", null=0.0, low=0.0, high=50.0, typical=1.0,
-            reason="friction above the largest torque would hold the machine still",
-        ),
+        friction_torque("stribeck_torque", 1.0),
         Parameter(
             "stribeck_velocity", "rad/s", null=0.03, low=0.003, high=1.0, typical=0.03, logarithmic=True,
             reason="from half a percent of the largest speed to more than it",

@@ -13,6 +13,7 @@ Ikhouane, Rodellar, Arch. Comput. Methods Eng. 16, 2009, eq. (2).
 import math
 
 from rsea_ros.compiler import njit
+from rsea_ros.effects._friction import friction_torque
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
 from rsea_ros.effects.signal_table import COMMIT, DEFLECTION, DEFLECTION_SPAN, SPRING_TORQUE, Port
 
@@ -81,10 +82,7 @@ EFFECT = Effect(
     name="spring_hysteresis",
     port=Port.SPRING,
     parameters=(
-        Parameter(
-            "torque", "N m", null=0.0, low=0.0, high=50.0, typical=1.0,
-            reason="friction above the largest torque would hold the machine still",
-        ),
+        friction_torque("torque", 1.0),
         Parameter(
             "angle", "rad", null=2e-3, low=1e-4, high=0.05, typical=2e-3, logarithmic=True,
             reason="from 1/200 of the deflection at the largest torque to more than it",

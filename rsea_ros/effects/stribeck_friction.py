@@ -10,7 +10,7 @@ see _friction.py. Source: Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica
 import math
 
 from rsea_ros.compiler import njit
-from rsea_ros.effects._friction import PRESLIDING, against, mean_friction
+from rsea_ros.effects._friction import PRESLIDING, against, friction_torque, mean_friction
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
 from rsea_ros.effects.signal_table import GEAR_TORQUE, GEAR_VELOCITY, Port
 
@@ -33,14 +33,8 @@ EFFECT = Effect(
     name="stribeck_friction",
     port=Port.GEAR,
     parameters=(
-        Parameter(
-            "coulomb_torque", "N m", null=0.0, low=0.0, high=50.0, typical=1.5,
-            reason="friction above the largest torque would hold the machine still",
-        ),
-        Parameter(
-            "stribeck_torque", "N m", null=0.0, low=0.0, high=50.0, typical=2.0,
-            reason="friction above the largest torque would hold the machine still",
-        ),
+        friction_torque("coulomb_torque", 1.5),
+        friction_torque("stribeck_torque", 2.0),
         Parameter(
             "stribeck_velocity", "rad/s", null=0.05, low=0.005, high=1.0, typical=0.05, starts=(0.015, 0.2),
             logarithmic=True, reason="from a hundredth of the largest speed to more than it",

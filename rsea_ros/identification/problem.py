@@ -326,9 +326,8 @@ def _other_starts(drive: Drive, noise: Mapping[str, float]) -> Iterator[Drive]:
     """Yield a drive from states, at its start and behind gaps, off by what its sensors' noise shows."""
     for motion, spring in _near(drive.initial, drive.spring, noise):
         yield replace(drive, initial=motion, spring=spring)
-    for i, (k, state) in enumerate(drive.restarts):
-        if not isinstance(state, LoadStart):
-            continue
+    moving = [(i, k, state) for i, (k, state) in enumerate(drive.restarts) if isinstance(state, LoadStart)]
+    for i, k, state in moving:
         for motion, spring in _near((state.position, state.velocity), state.spring, noise):
             anew = k, LoadStart(*motion, spring or state.spring)
             yield replace(drive, restarts=(*drive.restarts[:i], anew, *drive.restarts[i + 1 :]))
