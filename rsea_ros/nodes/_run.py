@@ -190,7 +190,7 @@ def run_nodes(components: Sequence[Component], arguments: Sequence[str] = ()) ->
 
 
 def _wait_for_no_reader() -> None:
-    """Drop what a full pipe, or a terminal after Ctrl-S, does not take: it would hold up cycle and answers."""
+    """Drop what a full pipe, or a terminal after Ctrl-S, does not take: it holds up cycle and answers."""
     for stream in (1, 2):
         with suppress(OSError):
             if os.isatty(stream):  # opened anew: a shell waits for the terminal as before
@@ -235,11 +235,8 @@ class _Stop:
 
     def __init__(self) -> None:
         self.status = 0
-        self._numbers = [
-            n
-            for n in ENDING
-            if n in STOPPING or signal.getsignal(n) is signal.SIG_DFL  # no other handler
-        ]
+        # Another handler keeps its signal.
+        self._numbers = [n for n in ENDING if n in STOPPING or signal.getsignal(n) is signal.SIG_DFL]
         for number in self._numbers:
             signal.signal(number, self._ask)
 
