@@ -231,11 +231,10 @@ class SignalListener:
 
 
 class _Stop:
-    """A signal is only a request: the node publishes its zeros before it exits."""
+    """A signal is only a request: the node publishes its zeros before it exits. Other handlers stay."""
 
     def __init__(self) -> None:
         self.status = 0
-        # Another handler keeps its signal.
         self._numbers = [n for n in ENDING if n in STOPPING or signal.getsignal(n) is signal.SIG_DFL]
         for number in self._numbers:
             signal.signal(number, self._ask)
