@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 from rsea_ros.errors import DeviceError
-from rsea_ros.hardware.device import NoReply
+from rsea_ros.hardware.device import NoReply, PortLost
 from rsea_ros.hardware.limits import Limits, Rating
-from rsea_ros.hardware.protection import Protection, Supervised
+from rsea_ros.hardware.protection import ANSWER, Protection, Supervised
 
 T = TypeVar("T")
 ATTEMPTS = 5
@@ -23,10 +23,8 @@ AS_CONFIGURED = "as it was at configure (another one needs cleanup and configure
 def repeat(transaction: Callable[[], T]) -> T:
     """Return the result of a transaction, repeated when a reply is lost."""
     for _ in range(ATTEMPTS - 1):
-        try:
+        with suppress(NoReply):
             return transaction()
-        except NoReply:
-            continue
     return transaction()
 
 
@@ -149,13 +147,15 @@ class BusMotor(ABC):
                 raise DeviceError(f"{self.name}: it has not acknowledged zero torque, cut its power")
 
     def _let_go(self) -> None:
-        """Zero torque, off, port closed; where the motor does not acknowledge it, the supervisor tries."""
+        """Zero torque, off, port closed; what is not acknowledged the supervisor tries, on no lost port."""
+        lost = False
         try:
-            with suppress(DeviceError):
-                self.disable()
+            self.disable()
+        except DeviceError as error:
+            lost = isinstance(error, PortLost)
         finally:
-            if isinstance(self.protection, Supervised):
-                self.protection.release(safe=not self._owes_zero)
+            if isinstance(self.protection, Supervised):  # the cycles of all joints wait meanwhile
+                self.protection.release(safe=not self._owes_zero, patience=0.0 if lost else ANSWER)
             self._end()
 
     def _check_same(self, found: Mapping[str, object]) -> None:

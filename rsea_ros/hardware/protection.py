@@ -88,9 +88,9 @@ class _End:
         except OSError:
             return False
 
-    def close(self) -> None:
+    def close(self, patience: float = ANSWER) -> None:
         """End the connection, and wait until it has let the port go, which nobody else can open before."""
-        self._socket.settimeout(ANSWER)
+        self._socket.settimeout(patience)
         with suppress(OSError):
             self._socket.shutdown(socket.SHUT_WR)
             while self._socket.recv(4096):
@@ -161,12 +161,12 @@ class Supervisor:
             self._lost = True
             raise SupervisorLost(f"supervisor process: {wrong}, expected it to run")
 
-    def close(self, *, safe: bool = True) -> None:
-        """End it. safe: the motor has acknowledged zero torque; else the supervisor sends its frames."""
+    def close(self, *, safe: bool, patience: float) -> None:
+        """End it in `patience`, s. safe: the motor has acknowledged zero torque; else its frames go out."""
         if safe:
             with suppress(OSError):
                 self._end.send(b"q")
-        self._end.close()
+        self._end.close(patience)
 
 
 BUS_WATCHDOG, SUPERVISOR, PROCESS, NONE = "bus watchdog", "supervisor", "process", "none"
@@ -218,8 +218,7 @@ class Supervised(Protection):
         sends to acknowledge one of them; the supervisor repeats it until then. Raises SupervisorLost.
         """
         if self._supervisor is not None and not self._supervisor.alive():
-            self._supervisor.close()
-            self._supervisor = None
+            self.release(safe=True)
         if self._supervisor is None:
             self._supervisor = Supervisor(descriptor, self._within, frames, replies, self._service)
 
@@ -228,8 +227,8 @@ class Supervised(Protection):
         if self._supervisor is not None:
             self._supervisor.beat(armed)
 
-    def release(self, *, safe: bool) -> None:
-        """End the supervisor. safe: the device has acknowledged zero torque; else the frames are sent."""
+    def release(self, *, safe: bool, patience: float = ANSWER) -> None:
+        """End the supervisor, see its `close`."""
         if self._supervisor is not None:
-            self._supervisor.close(safe=safe)
+            self._supervisor.close(safe=safe, patience=patience)
             self._supervisor = None

@@ -33,8 +33,6 @@ TURNED = 0.6
 GRAVE, CYCLES, SIDED = 2.5, 2, 0.5
 """Times its doubts by which the spring contradicts ft gravely; readings running that are a fault; part of
 that by which the motor may be off the spring that it sides with."""
-LOST = 4.0
-"""Periods from one reading to the next, from which on the momentum between them is not known."""
 
 
 @dataclass(frozen=True)
@@ -109,7 +107,7 @@ class Witnesses:
         """Take a reading in; return the fault where both contradict ft gravely. torque: N m, commanded."""
         before, self._before = self._before, state
         time = 0.0 if before is None else 1e-9 * (state.stamp - before.stamp)
-        if before is None or state.wrench is None or not 0.0 < time < LOST * self._period:
+        if before is None or state.wrench is None or not time > 0.0:
             return None
         self._idle = 0 if torque != 0.0 else self._idle + 1
         signals = self._signals(before, state, state.wrench[self._spring.place], time)
@@ -117,7 +115,8 @@ class Witnesses:
             return None
         if self._low is None or math.isnan(signals.spring) != math.isnan(self._low.spring):
             self._begin()
-        self._low = _nearer(self._low or signals, signals, self._period / SMOOTH)
+        low = self._low or signals
+        self._low = _nearer(low, signals, time / SMOOTH)
         self._lately.append(signals)
         if self._idle * self._period <= PAUSE:
             if math.isnan(self._zero):
@@ -129,7 +128,7 @@ class Witnesses:
             if self._work.readings * self._period >= LASTING:
                 self._judge(self._work)
             live = (before.position, before.motor_torque) != (state.position, state.motor_torque)
-            return self._gravely(self._low, signals) if live else None  # else they are one witness, no two
+            return self._gravely(self._low, low) if live else None  # else they are one witness, no two
         self._rest = self._followed(self._rest, self._low)
         if math.isnan(self._known) or self._rest.readings * self._period >= LASTING:
             zero = self._rest.mean.ft - self._rest.mean.spring
@@ -151,24 +150,25 @@ class Witnesses:
             way=math.copysign(abs(state.velocity) > rig.creep, state.velocity),
         )
 
-    def _gravely(self, low: Signals, now: Signals) -> DeviceFault | None:
+    def _gravely(self, low: Signals, before: Signals) -> DeviceFault | None:
         """Return the fault of an ft that the spring contradicts gravely, and the motor sides with the spring.
 
-        now: what is ahead of the low-pass, which tells what a delay can make of it. What ft and spring
-        change against each other from one reading to the next tells what noise can.
+        before: the low-pass that the reading is ahead of: what a delay makes at most, however far readings
+        are apart. What ft and spring change against each other from one to the next tells what noise can.
         """
-        bend, self._apart, before = low.spring + self._zero, now.ft - now.spring, self._apart
+        now = self._lately[-1]
+        ahead = abs(now.spring - before.spring), abs(now.motor - before.motor)
+        bend, self._apart, apart = low.spring + self._zero, now.ft - now.spring, self._apart
         if math.isnan(bend):
             return None
         part = min(self._period / SMOOTH, 1.0)
-        self._noise += part * (abs(self._apart - before) - self._noise)
-        ahead = abs(now.spring - low.spring), abs(now.motor - low.motor)
+        self._noise += part * (abs(self._apart - apart) - self._noise)
         late, hasty = (self._rig.late / SMOOTH * torque for torque in ahead)
         off, least = abs(low.ft - bend), min(abs(low.ft), abs(bend)) if low.ft * bend > 0.0 else 0.0
         most = GRAVE * max(self._rig.bent * least, self._rig.play)
         sided = abs(bend - low.motor) + hasty < SIDED * off
         if not (sided and off - late - self._noise > most):
-            low, (off, most) = self._lately[-1], self._opposed(low)
+            low, (off, most) = now, self._opposed(low)
             self._grave = self._grave if off - self._noise > most else -1
         self._grave += 1
         if self._grave < CYCLES:

@@ -190,10 +190,13 @@ def run_nodes(components: Sequence[Component], arguments: Sequence[str] = ()) ->
 
 
 def _wait_for_no_reader() -> None:
-    """Drop what a full pipe does not take: a reader that has stopped would hold up cycle and answers."""
+    """Drop what a full pipe, or a terminal after Ctrl-S, does not take: it holds up cycle and answers."""
     for stream in (1, 2):
         with suppress(OSError):
-            if not stat.S_ISCHR(mode := os.fstat(stream).st_mode) and not stat.S_ISREG(mode):
+            if os.isatty(stream):  # opened anew: a shell waits for the terminal as before
+                own = os.open(f"/proc/self/fd/{stream}", os.O_WRONLY | os.O_NOCTTY | os.O_NONBLOCK)
+                os.dup2(own, stream)
+            elif not stat.S_ISREG(os.fstat(stream).st_mode):
                 os.set_blocking(stream, False)
 
 
@@ -228,15 +231,11 @@ class SignalListener:
 
 
 class _Stop:
-    """A signal is only a request: the node publishes its zeros before it exits."""
+    """A signal is only a request: the node publishes its zeros before it exits. Other handlers stay."""
 
     def __init__(self) -> None:
         self.status = 0
-        self._numbers = [
-            n
-            for n in ENDING
-            if n in STOPPING or signal.getsignal(n) is signal.SIG_DFL  # no other handler
-        ]
+        self._numbers = [n for n in ENDING if n in STOPPING or signal.getsignal(n) is signal.SIG_DFL]
         for number in self._numbers:
             signal.signal(number, self._ask)
 

@@ -209,12 +209,14 @@ class DriverNode(ManagedEntity, Program):
 
     def _close_devices(self) -> None:
         """Close every device whatever one raises; all torques are zero before the first, slow, close."""
-        end = time.monotonic() + RETURN
+        end, away = time.monotonic() + RETURN, list[str]()
         with ExitStack() as kept:
-            for joint in self.joints:
-                kept.callback(_close, joint.guarded.device, end)
+            for joint in reversed(self.joints):
+                kept.callback(_close, joint.guarded.device, end, away)
             if self._cycle is not None and len(self.joints) > 1:
                 self._zero()
+        if away:
+            raise DeviceError("; ".join(away))
 
     def _zero(self) -> None:
         for joint in self.joints:
@@ -266,14 +268,14 @@ class DriverNode(ManagedEntity, Program):
         return ", ".join(done)
 
 
-def _close(device: Device, end: float) -> None:
-    """Close a device, again until an instant (s) where it is away with its torque on. Raises DeviceError."""
+def _close(device: Device, end: float, away: list[str]) -> None:
+    """Close a device, again until an instant (s) where it is away with its torque on; then add its words."""
     while True:
         try:
             return device.close()
-        except DeviceError:
+        except DeviceError as error:
             if time.monotonic() > end:
-                raise
+                return away.append(f"{error}")
         time.sleep(POLL)
 
 

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import termios
+import time
 from pathlib import Path
 
 import pytest
@@ -15,7 +16,7 @@ from rsea_ros.errors import DeviceError
 from rsea_ros.hardware import supervisor
 from rsea_ros.hardware.device import PortLost
 from rsea_ros.hardware.dynamixel.port import SerialPort
-from rsea_ros.hardware.protection import SupervisorLost
+from rsea_ros.hardware.protection import ANSWER, SupervisorLost
 from test.hardware.conftest import Loop, well_behaved
 from test.nodes.stalls import until
 
@@ -41,10 +42,15 @@ def test_registers_that_the_torque_depends_on_are_read_once_a_second(loop, regis
 
 @pytest.mark.parametrize("loop", (54024, "AK10-9"), indirect=True)
 def test_a_motor_behind_an_adapter_that_is_back_is_switched_off_before_anybody_clears(loop):
-    """It went on with its last goal, also after a stop and a deactivation that were answered with success."""
+    """It went on with its last goal, also after a stop and a deactivation that were answered with success.
+
+    And the cycles of all joints of its driver stood still for a second: those on other ports lost theirs.
+    """
     loop.cycles(20, 8.0)
     loop.bench.ask("vanish")
+    begun = time.monotonic()
     loop.until_fault(8.0)
+    assert time.monotonic() - begun < ANSWER
     assert loop.bench.torque()[0] != 0
     loop.bench.ask("appear")
     for _ in range(40):

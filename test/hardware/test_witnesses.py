@@ -46,15 +46,15 @@ def bench(rig, plant=None, rate=RATE):
     return guarded, now, device
 
 
-def play(guarded, now, wave, torque, seconds, *, until_fault=False):
+def play(guarded, now, wave, torque, seconds, *, until_fault=False, rate=RATE):
     """Play a wave until something is told or the time is over; return what was told and the time, s."""
     dice = np.random.default_rng(0)
-    for k in range(round(seconds * RATE)):
-        now[0] += round(SECOND / RATE)
-        guarded.cycle(torque * WAVES[wave](k / RATE, dice), 0.0)
+    for k in range(round(seconds * rate)):
+        now[0] += round(SECOND / rate)
+        guarded.cycle(torque * WAVES[wave](k / rate, dice), 0.0)
         if guarded.fault or (guarded.contradiction and not until_fault):
             break
-    return guarded.contradiction, k / RATE
+    return guarded.contradiction, k / rate
 
 
 def falsify(device, monkeypatch, gain=1.0, bias=0.0):
@@ -289,6 +289,18 @@ def test_a_rest_does_not_make_a_falsified_zero_the_true_one(monkeypatch):
     assert play(guarded, now, "rest", 0.0, 3.0)[0] == ""
     _, after = play(guarded, now, "hold", 10.0, 3.0)
     assert guarded.fault.cause == "ft" and after < 0.1
+
+
+@pytest.mark.parametrize("wrong", [{"bias": 10.0}, {"gain": -1.0}])
+@pytest.mark.parametrize("rate", [50.0, 20.0])
+def test_readings_far_apart_are_witnesses_too(monkeypatch, wrong, rate):
+    """With no two cycles within 14 ms, as on a busy machine, a bias under torque was unnoticed."""
+    guarded, now, device = bench(RIG)
+    play(guarded, now, "rest", 0.0, 1.0)
+    assert play(guarded, now, "hold", 10.0, 2.0, rate=rate)[0] == "" and guarded.fault is None
+    falsify(device, monkeypatch, **wrong)
+    assert play(guarded, now, "hold", 10.0, 1.0, until_fault=True, rate=rate)[1] < 4.5 / rate
+    assert guarded.fault.cause == "ft"
 
 
 def test_a_slow_rate_does_not_let_the_low_pass_run_away():

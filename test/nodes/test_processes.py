@@ -38,20 +38,26 @@ def test_a_started_program_does_not_hear_the_terminals_ctrl_c():
     assert begun.returncode == -signal.SIGTERM
 
 
-def test_a_driver_whose_output_nobody_reads_answers(listener, tmp_path):
-    """Its first log line into a full pipe was its last; a stop was never answered."""
-    os.mkfifo(log := tmp_path / "log")
-    reader = os.open(log, os.O_RDONLY | os.O_NONBLOCK)
-    process = Process("driver", log, {"device": "simulated", "autostart": True}, {"__ns": "/mute"})
-    writer = os.open(log, os.O_WRONLY | os.O_NONBLOCK)
-    with suppress(BlockingIOError):
-        while True:
-            os.write(writer, b"full")
+@pytest.mark.parametrize("way", ["pipe", "terminal"])
+def test_a_driver_whose_output_nobody_reads_answers(listener, tmp_path, way):
+    """Its first log line into a full pipe, or a terminal after Ctrl-S, was its last: no stop was answered."""
+    log = tmp_path / "log"
+    if way == "pipe":
+        os.mkfifo(log)
+        ends = [os.open(log, os.O_RDWR | os.O_NONBLOCK)]
+        with suppress(BlockingIOError):
+            while True:
+                os.write(ends[0], b"full")
+    else:
+        ends = os.openpty()
+        log.symlink_to(os.ttyname(ends[1]))
+        os.write(ends[0], b"\x13")
+    process = Process("driver", log, {"device": "simulated", "autostart": True}, {"__ns": f"/{way}"})
     for service in ("stop", "clear_fault"):
-        assert listener.call(f"/mute/driver/{service}").success
+        assert listener.call(f"/{way}/driver/{service}").success
     assert process.stop(signal.SIGTERM) == 0
-    os.close(reader)
-    os.close(writer)
+    for end in ends:
+        os.close(end)
 
 
 ROOT = Path(__file__).resolve().parents[2]
