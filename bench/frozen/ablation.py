@@ -72,6 +72,7 @@ BRANCHES: Mapping[str, Branch] = {
     "pairs": Branch({f"{FORWARD}._pairs": _nothing}),
     "pairs nearer the rig": Branch({f"{FORWARD}._pairs_nearer_the_rig": _nothing}),
     "a tenth of the guess": Branch({"step_fits:_other_guesses": _nothing}),
+    "common clock into the delay": Branch({"candidate:with_clocks_in_delay": lambda solution: None}),
     "quick replacement dropped": Branch(
         {"backward_elimination:ReducedModels._with": _fitted_on}, acts=_was_dropped),
     "close rivals fitted to the end": Branch(

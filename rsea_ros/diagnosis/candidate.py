@@ -95,6 +95,23 @@ def is_apart(effect: Effect, model: Problem) -> bool:
     return bool(sensors - late - {effect.sensor} - ({"motor_torque"} if late else set()))
 
 
+def with_clocks_in_delay(solution: Solution) -> FloatArray | None:
+    """Return theta with what its clocks have in common in the command's delay; None without one.
+
+    Where a delay is a whole number of commands the residual has a kink, and a fit may stop there with the
+    rest in the clocks.
+    """
+    unknowns, acting = solution.problem.unknowns, map(effect_named, solution.problem.acting)
+    delays = {f"{e.name}.{e.main.name}" for e in acting if "delay" in e.tags}
+    delay = [i for i, u in enumerate(unknowns) if u.name in delays]
+    clocks = [i for i, u in enumerate(unknowns) if u.is_clock and not u.is_rate]
+    if not delay or not clocks:
+        return None
+    theta = solution.theta.copy()
+    theta[[*clocks, *delay]] -= np.mean(theta[clocks])
+    return np.asarray(theta)
+
+
 @dataclass(frozen=True)
 class Candidate:
     """A fitted model with its simulated channels on every case and its score on the validation blocks.
@@ -197,6 +214,9 @@ def fit_candidate(
     """
     masked = setup.mask(problem)
     solution = setup.solve(masked, theta, None if near is None else _reweight(near, masked))
+    moved = with_clocks_in_delay(solution)
+    if moved is not None:
+        solution = min(solution, setup.solve(masked, moved), key=lambda s: s.cost)
     outputs = solution.problem.outputs(solution.theta)
     validation = score_on(solution.problem, setup.cases, VALIDATION, outputs, setup.settings.blocks)
     return Candidate(solution, outputs, validation, setup.cases, setup.settings)

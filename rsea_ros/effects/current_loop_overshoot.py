@@ -62,8 +62,7 @@ EFFECT = Effect(
     parameters=(
         Parameter(
             "time_constant", "s", null=0.0, low=1e-4, high=0.05, typical=4e-3, starts=(1.5e-3, 0.01),
-            logarithmic=True,
-            reason="natural frequencies of 3 Hz to 1.6 kHz, as for the lag",
+            logarithmic=True, reason="natural frequencies of 3 Hz to 1.6 kHz, as for the lag",
         ),
         Parameter(
             "overshoot", "1", null=0.3, low=0.01, high=0.9, typical=0.3, logarithmic=True,

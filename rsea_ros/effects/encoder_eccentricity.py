@@ -11,6 +11,7 @@ from collections.abc import Sequence
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
 from rsea_ros.effects.guess import Guess, ResidualView
+from rsea_ros.effects.parameter import PHASE
 from rsea_ros.effects.signal_table import OUTPUT_ANGLE, POSITION, TURNS, VELOCITY, Port
 
 
@@ -38,14 +39,9 @@ EFFECT = Effect(
         ),
         Parameter(
             "cycles_per_revolution", "1", null=1.0, low=0.001, high=60.0, typical=1.0, starts=(2.0,),
-            logarithmic=True,
-            reason="from a slow gear stage to the poles of a magnet ring",
+            logarithmic=True, reason="from a slow gear stage to the poles of a magnet ring",
         ),
-        Parameter(
-            "phase", "rad", null=0.0, low=-2.0 * math.pi, high=2.0 * math.pi, typical=0.7, starts=(-2.4, -0.9,
-            2.3), is_fixed=True,
-            reason="one turn either way, so that a fit can pass the end of a turn",
-        ),
+        PHASE,
     ),
     claims=Claims("velocity", "neither", amplitude_exponent=None),
     function=apply,

@@ -6,9 +6,11 @@ Source: Ott, Electromagnetic Compatibility Engineering, 2009, ch. 2 (cabling).
 """
 
 import math
+from dataclasses import replace
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
 from rsea_ros.effects.guess import at_lines
+from rsea_ros.effects.parameter import PHASE
 from rsea_ros.effects.signal_table import FT, TIME, Port
 
 
@@ -31,11 +33,7 @@ EFFECT = Effect(
             "frequency", "Hz", null=50.0, low=45.0, high=65.0, typical=50.0, starts=(60.0,), is_fixed=True,
             reason="50 or 60 Hz on every machine; a grid keeps it to 1 %",
         ),
-        Parameter(
-            "phase", "rad", null=0.0, low=-2.0 * math.pi, high=2.0 * math.pi, typical=0.0, starts=(-1.6, 1.6,
-            3.1), optional=True, per_record=True, is_fixed=True,
-            reason="one turn either way, so that a fit can pass the end of a turn",
-        ),
+        replace(PHASE, typical=0.0, starts=(-1.6, 1.6, 3.1), optional=True, per_record=True),
     ),
     claims=Claims("ft", "even", amplitude_exponent=0.0),
     function=apply,

@@ -144,6 +144,12 @@ _WIDEST = {"rad": 64.0, "1/rad": 64.0, "s": 64.0, "Hz": 64.0}
 """How far some units may go: springs of a few mrad to some rad, records of 5 Hz to 18 kHz."""
 
 
+PHASE = Parameter(
+    "phase", "rad", null=0.0, low=-2.0 * math.pi, high=2.0 * math.pi, typical=0.7, starts=(-2.4, -0.9, 2.3),
+    is_fixed=True, reason="one turn either way, so that a fit can pass the end of a turn",
+)
+
+
 def scale_to(torque: float, stiffness: float, inertia: float, speed: float, period: float) -> Scale:
     """Return the scale of a machine: largest torque, N m, stiffness, N m/rad, inertia, kg m^2, and so on.
 

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from rsea_ros.compiler import njit
 from rsea_ros.effects.effect import Claims, Effect, OfRotorAngle, Parameter, compiled
 from rsea_ros.effects.guess import Guess, ResidualView
+from rsea_ros.effects.parameter import PHASE
 from rsea_ros.effects.signal_table import GEAR_TORQUE, ROTOR_ANGLE, Port
 
 LAST, STARTED = range(2)
@@ -53,11 +54,7 @@ EFFECT = Effect(
             8.0, 12.0), logarithmic=True,
             reason="from a slow gear stage to the cogging of many poles",
         ),
-        Parameter(
-            "phase", "rad", null=0.0, low=-2.0 * math.pi, high=2.0 * math.pi, typical=0.7, starts=(-2.4, -0.9,
-            2.3), is_fixed=True,
-            reason="one turn either way, so that a fit can pass the end of a turn",
-        ),
+        PHASE,
     ),
     claims=Claims("position", "neither", amplitude_exponent=None),
     function=apply,

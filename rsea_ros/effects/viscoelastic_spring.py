@@ -40,8 +40,7 @@ EFFECT = Effect(
         ),
         Parameter(
             "time_constant", "s", null=0.1, low=3e-3, high=10.0, typical=0.1, starts=(0.02, 0.5),
-            logarithmic=True,
-            reason="faster it is the spring's damping, slower its stiffness",
+            logarithmic=True, reason="faster it is the spring's damping, slower its stiffness",
         ),
     ),
     claims=Claims("velocity", "odd", amplitude_exponent=1.0, passive=True),

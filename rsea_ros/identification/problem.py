@@ -340,7 +340,7 @@ def _near(
     yield (q + off, w), spring
     yield (q, w + off / APART), spring
     if spring is not None:
-        off = noise[spring.channel]
+        off = noise.get(spring.channel, OFF)
         yield motion, spring._replace(value=spring.value + off)
         yield motion, spring._replace(rate=spring.rate + off / APART)
 

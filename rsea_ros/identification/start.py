@@ -234,13 +234,13 @@ def _with_load_starts(problem: Problem, theta: FloatArray) -> Problem:
 
 
 def _started(case: Case, rig: Rig, clocks: Clocks, problem: Problem) -> Case:
-    drive, channel = case.drive, next((n for n in ("deflection", "ft") if n in case.measured), "")
-    if not isinstance(drive, Drive) or not channel or not any(k > 0 for k, _ in drive.restarts):
+    drive, channel = case.drive, next((n for n in ("deflection", "ft") if n in case.measured), "deflection")
+    if not isinstance(drive, Drive) or not any(k > 0 for k, _ in drive.restarts):
         return case
     if rig.rigid_spring or mechanics(rig.under(case.source)).order < 2:
         return case
     states = np.array([_state(case, channel, k, drive.step, state) for k, state in drive.restarts])
-    off = np.array([case.noise.get("position", OFF), case.noise[channel]])
+    off = np.array([case.noise.get("position", OFF), case.noise.get(channel, OFF)])
     sizes = np.outer(off, (1.0, 1.0 / APART)).ravel()
     others = [_beginning(drive, channel, states + change) for change in np.diag(sizes)]
     begun = replace(case, drive=_beginning(drive, channel, states))
@@ -262,7 +262,7 @@ def _state(
     if isinstance(state, LoadStart):
         return np.array([*state[:2], *state.spring[1:]])
     t = case.start + k * step
-    shown = float(np.interp(t, case.t[channel], case.measured[channel]))
+    shown = float(np.interp(t, case.t[channel], case.measured[channel])) if channel in case.t else 0.0
     return np.array([*(state if not isinstance(state, SpringStart) else (0.0, 0.0)), shown, 0.0])
 
 
