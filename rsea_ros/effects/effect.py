@@ -17,7 +17,7 @@ from rsea_ros.compiler import cfunc
 from rsea_ros.documents.units import with_unit
 from rsea_ros.documents.wording import quote
 from rsea_ros.effects.guess import Guess, Guesses
-from rsea_ros.effects.parameter import Parameter as Parameter, Scale
+from rsea_ros.effects.parameter import PHASE as PHASE, Parameter as Parameter, Scale
 from rsea_ros.effects.signal_table import Port, sensor_of
 from rsea_ros.errors import ParameterError
 

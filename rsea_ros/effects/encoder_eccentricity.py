@@ -9,9 +9,8 @@ Self-calibration of on-axis rotary encoders, CIRP Annals 56, 2007 (first harmoni
 import math
 from collections.abc import Sequence
 
-from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
+from rsea_ros.effects.effect import PHASE, Claims, Effect, Parameter, compiled
 from rsea_ros.effects.guess import Guess, ResidualView
-from rsea_ros.effects.parameter import PHASE
 from rsea_ros.effects.signal_table import OUTPUT_ANGLE, POSITION, TURNS, VELOCITY, Port
 
 

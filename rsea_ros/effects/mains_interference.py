@@ -8,9 +8,8 @@ Source: Ott, Electromagnetic Compatibility Engineering, 2009, ch. 2 (cabling).
 import math
 from dataclasses import replace
 
-from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
+from rsea_ros.effects.effect import PHASE, Claims, Effect, Parameter, compiled
 from rsea_ros.effects.guess import at_lines
-from rsea_ros.effects.parameter import PHASE
 from rsea_ros.effects.signal_table import FT, TIME, Port
 
 

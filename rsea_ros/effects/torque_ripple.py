@@ -11,9 +11,8 @@ import math
 from collections.abc import Sequence
 
 from rsea_ros.compiler import njit
-from rsea_ros.effects.effect import Claims, Effect, OfRotorAngle, Parameter, compiled
+from rsea_ros.effects.effect import PHASE, Claims, Effect, OfRotorAngle, Parameter, compiled
 from rsea_ros.effects.guess import Guess, ResidualView
-from rsea_ros.effects.parameter import PHASE
 from rsea_ros.effects.signal_table import GEAR_TORQUE, ROTOR_ANGLE, Port
 
 LAST, STARTED = range(2)
