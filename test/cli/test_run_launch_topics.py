@@ -91,7 +91,8 @@ def first_message(topic: str, *running: subprocess.Popen[bytes]) -> dict[str, An
         if echo.returncode == 0:
             message: dict[str, Any] = yaml.safe_load(echo.stdout.split("---")[0])
             return message
-    raise AssertionError(f"ended before {topic} was published")
+    said = [p.stderr.read() for p in running if p.stderr and p.poll() is not None]
+    raise AssertionError(f"ended before {topic} was published: {said}")
 
 
 def test_a_launched_graph_hears_the_documented_controller_and_one_signal_ends_it(tmp_path):
