@@ -21,7 +21,6 @@ from rsea_ros.model.simulation import on_short_steps
 from rsea_ros.records.record import FloatArray
 
 _Run = tuple[tuple[Case, ...], list[dict[str, FloatArray]]]
-"""Cases, and the outputs of each."""
 
 
 def on_blocks(
@@ -229,16 +228,15 @@ def refit(model: Candidate, setup: FitSetup) -> Candidate:
 
 
 def on_fine_steps(model: Candidate, setup: FitSetup) -> Candidate:
-    """Return a candidate `on_short_steps`; itself if its own are, or a loop samples as it steps."""
+    """Return a candidate `on_short_steps`; itself if its own are short, or a loop samples as it steps."""
     if model.problem.rig.loop is not None:
         return model
 
-    def finer_of(run: _Run) -> _Run:
-        cases, _ = run
-        halved = tuple(replace(c, drive=finer(c.drive)) if isinstance(c.drive, Drive) else c for c in cases)
+    def halve(run: _Run) -> _Run:
+        halved = tuple(replace(c, drive=finer(c.drive)) if isinstance(c.drive, Drive) else c for c in run[0])
         return halved, replace(model.problem, cases=halved).outputs(model.solution.theta)
 
-    cases, outputs = on_short_steps((model.cases, model.outputs), finer_of, _change)
+    cases, outputs = on_short_steps((model.cases, model.outputs), halve, _change)
     return model if cases is model.cases else refit(rescore(replace(model, outputs=outputs), cases), setup)
 
 

@@ -422,7 +422,7 @@ def _calls(
     return calls, max(1, sum(x_sizes))
 
 
-STEP_ERROR = 0.05
+_STEP_ERROR = 0.05
 """Of the noise: change by half a step from which a model is simulated on shorter ones. At 0.25 a delay that
 moved the steps off the commands paid for itself, and was confirmed."""
 _HALVINGS, _FALLS = 2, 0.5
@@ -431,23 +431,22 @@ S = TypeVar("S")
 _Simulated = tuple[Drive, dict[str, FloatArray]]
 
 
-def on_short_steps(simulated: S, finer: Callable[[S], S], change: Callable[[S, S], float]) -> S:
-    """Return a simulation on steps so short that it errs less than the sensors; itself if it does.
+def on_short_steps(first: S, halve: Callable[[S], S], change: Callable[[S, S], float]) -> S:
+    """Return a simulation on steps so short that it errs less than the sensors; the first if that does.
 
-    finer: the simulation on steps half as long. change: between two, over the noise. The error of a step is
-    the change by half of it. Where half of that changes as much, as in contacts that bounce, a shorter step
-    is no better, and none is taken.
+    halve: the same on half the step. change: between two, over the noise; by half a step it is its error.
+    Where half of that changes as much, as in contacts that bounce, a shorter one is no better, and not taken.
     """
-    error, best = math.inf, simulated
+    error, best, now = math.inf, first, first
     for _ in range(_HALVINGS + 1):
-        halved = finer(simulated)
-        changed = change(simulated, halved)
+        halved = halve(now)
+        changed = change(now, halved)
         if changed > _FALLS * error:
             break
-        best, error = simulated, changed
-        if changed < STEP_ERROR:
+        best, error = now, changed
+        if changed < _STEP_ERROR:
             break
-        simulated = halved
+        now = halved
     return best
 
 
@@ -475,7 +474,8 @@ def synthesize(rig: Rig, command: Channel, *, seed: int = 0, noise: bool = True)
         source=rig.name,
     )
     rng = sensor_noise(seed)
-    true = _converged(rig, drive_of(blank_record, rig))
+    drive = drive_of(blank_record, rig)
+    true = simulate_drive(rig, drive)
     for name, y in true.items():
         bad = ~(np.abs(y) <= LARGEST)
         if bad.any():
@@ -484,24 +484,25 @@ def synthesize(rig: Rig, command: Channel, *, seed: int = 0, noise: bool = True)
                 f"rig {rig.name}: its simulation runs away, {name} is {y[k]:g} at sample {k}, "
                 f"expected at most {LARGEST:g}: check the rig's values and effects"
             )
+    if rig.loop is None:
+        true = _on_short_steps(rig, drive, true)
     chain = Filters(rig, period, period)
     measured = {n: Channel(stamps, measure(rig, n, true[n], rng, chain) if noise else true[n]) for n in names}
     return blank_record.with_channels(**measured)
 
 
-def _converged(rig: Rig, drive: Drive) -> dict[str, FloatArray]:
-    """Return the channels of a drive `on_short_steps`."""
+def _on_short_steps(rig: Rig, drive: Drive, true: dict[str, FloatArray]) -> dict[str, FloatArray]:
+    """Return the channels of a drive on steps that err less than the sensors. true: on its own steps."""
+    noises = {n: rig.sensors[n].noise for n in true if n in rig.sensors and rig.sensors[n].noise > SMALLEST}
 
-    def moved(before: _Simulated, after: _Simulated) -> float:
-        noises = {n: rig.sensors[n].noise for n in before[1] if n in rig.sensors}
-        squares = {n: np.mean((before[1][n] - after[1][n]) ** 2) for n, s in noises.items() if s > SMALLEST}
-        return max((math.sqrt(square) / noises[n] for n, square in squares.items()), default=0.0)
+    def change(before: _Simulated, after: _Simulated) -> float:
+        squares = ((np.mean((before[1][n] - after[1][n]) ** 2), noise) for n, noise in noises.items())
+        return max((math.sqrt(square) / noise for square, noise in squares), default=0.0)
 
-    def halved(run: _Simulated) -> _Simulated:
-        return (half := finer(run[0])), simulate_drive(rig, half)
+    def halved(simulated: _Simulated) -> _Simulated:
+        return (half := finer(simulated[0])), simulate_drive(rig, half)
 
-    run = drive, simulate_drive(rig, drive)
-    return (on_short_steps(run, halved, moved) if rig.loop is None else run)[1]
+    return on_short_steps((drive, true), halved, change)[1]
 
 
 def sensor_noise(seed: int) -> np.random.Generator:

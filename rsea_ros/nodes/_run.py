@@ -196,6 +196,7 @@ def _wait_for_no_reader() -> None:
             if os.isatty(stream):  # opened anew: a shell waits for the terminal as before
                 own = os.open(f"/proc/self/fd/{stream}", os.O_WRONLY | os.O_NOCTTY | os.O_NONBLOCK)
                 os.dup2(own, stream)
+                os.close(own)
             elif not stat.S_ISREG(os.fstat(stream).st_mode):
                 os.set_blocking(stream, False)
 
