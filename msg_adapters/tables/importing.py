@@ -408,6 +408,7 @@ _COUNTERS, _NEAR = [2.0**bits * 10.0**-places for bits in (16, 32) for places in
 """Where counters of 16 and 32 bits begin anew, also of ms, µs, ns made s; usual steps that they go then."""
 
 
+@np.errstate(over="ignore")  # a stamp of 1e308 is told where the record is made
 def without_wraps(x: FloatArray) -> tuple[FloatArray, str]:
     """Return stamps as the counter without an end would have them, and a note on one that began anew."""
     step = np.diff(x, prepend=x[0])
