@@ -6,11 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rsea_ros.checks.finding import Finding, Findings
 from rsea_ros.checks.pairs import Pair, is_held, laws, pairs_of
 from rsea_ros.checks.verdicts import factors, in_step, start_of, verdict_findings
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.records.record import Channel, Record
-from rsea_ros.report.check import sentence
+from rsea_ros.records.record import Channel, Fault, Record
+from rsea_ros.report.check import sentence, warnings
 
 RIG = load_rig("paper_high_impedance")
 K, B, J = 1530.456, 23.088 + 3.0, 0.953 + 0.004
@@ -270,3 +271,11 @@ def test_a_fit_begins_with_what_the_pairs_measure() -> None:
     moved = in_step(run, {"ft": 0.5})
     assert moved["ft"].t[0] == pytest.approx(0.0, abs=1e-9) and moved["command"].t[-1] <= 9.4 + 1e-9
     assert moved["ft"].y[0] == pytest.approx(0.5)
+
+
+def test_what_results_repeat_is_not_warned_of_but_a_wrong_rig_is_and_first():
+    late, dead = Finding("amber", "clock_offset", "ft"), Finding("red", "frozen", "position")
+    ratio, noise = Finding("amber", "wrong_rig", "gear.ratio"), Finding("amber", "noise", "ft")
+    repeated = tuple(Fault(f.kind, f.channel, 1.0, "") for f in (dead, ratio))
+    findings = Findings("run", "rig", (dead, late, noise, ratio), repeated)
+    assert warnings(findings) == [sentence(ratio), sentence(late)]
