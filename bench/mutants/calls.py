@@ -11,7 +11,6 @@ import sys
 import tempfile
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from typing import NamedTuple
@@ -99,10 +98,12 @@ def _note() -> None:
         words = [sys.executable, "-m", "pytest", "-q", "-p", "recorder", "-n", "2", "--dist", "loadfile"]
         # ends threads by exceptions: never, beside the recorder
         words.append("--ignore=test/extras/fleet/test_time_limit.py")
-        with suppress(subprocess.TimeoutExpired):  # a test that hangs has noted its calls too
+        try:
             subprocess.run(
                 words, cwd=ROOT, env=environment, check=False, stdout=subprocess.DEVNULL, timeout=LONGEST
             )
+        except subprocess.TimeoutExpired:
+            sys.exit(f"the suite was not through after {LONGEST:g} s, expected a quieter machine")
     making.rename(NOTES)
 
 
