@@ -39,7 +39,9 @@ SAME = 1e-3
 COASTED = 3.0
 """Samples in which the course of a desired torque that is not renewed comes to rest."""
 FADE = 0.2
-"""Part by which a sample replaces the mean square of those before."""
+"""Part by which a sample replaces the mean square of those before, and a sender's pace comes back to one."""
+SENDER = 0.4
+"""Of the rate of a sender that pauses: the low pass is no faster (decision 392)."""
 
 
 class Prediction:
@@ -47,7 +49,7 @@ class Prediction:
 
     def __init__(self, corner: float, period: float) -> None:
         self._memory = math.exp(-2.0 * math.pi * corner * period)
-        self._soft = 1.0 - math.exp(-2.0 * math.pi * SMOOTH * period)
+        self._period = period
         self.start(0.0)
 
     def start(self, torque: float) -> None:
@@ -55,7 +57,7 @@ class Prediction:
         self._state: FloatArray = np.array([torque, 0.0, 0.0])
         self._smooth, self._off = (torque, torque), 0.0
         self._last, self._surprise, self._change, self.trust = torque, 0.0, 0.0, 1.0
-        self._promised, self._rest = torque, (0.0, 0.0)
+        self._promised, self._rest, self._pace = torque, (0.0, 0.0), 1.0
 
     def expected(self, samples: int) -> float:
         """Return the torque, N m, that is expected a number of samples after the last one."""
@@ -84,6 +86,7 @@ class Prediction:
             surprise = desired - expected[0]
             self._state = expected + gains_of(self._memory**interval, interval) * surprise
             self._trust(surprise, desired)
+            self._pace = max(interval, self._pace + FADE * (1.0 - self._pace))
         (rate, second), (j, half_square) = self._state[1:], instants(off, samples)
         passed = self._passed(*self._smooth, desired, samples + 1)
         self._smooth, along = passed[0], np.array([second for _, second in passed])
@@ -91,10 +94,7 @@ class Prediction:
         return self._eased(along, 1.0 - 1.0 / max(interval, 1.0))[:samples]
 
     def _eased(self, along: FloatArray, part: float) -> FloatArray:
-        """Return a course that comes from the one before, with a part of the difference through the low pass.
-
-        A surprise after a pause is otherwise a jump.
-        """
+        """Return a course that comes from the one before, a part of the difference through the low pass."""
         first, second = self._rest
         off = part * (self._promised - float(along[0]) - second)
         passed = self._passed(first + off, second + off, 0.0, len(along))
@@ -103,14 +103,13 @@ class Prediction:
         self._promised = float(along[1])
         return along
 
-    def _passed(
-        self, first: float, second: float, towards: float, samples: int
-    ) -> list[tuple[float, float]]:
+    def _passed(self, first: float, second: float, towards: float, samples: int) -> list[tuple[float, float]]:
         """Return both stages of the low pass in the samples to come of a constant input."""
-        path = []
+        corner = min(SMOOTH * self._period, max(SMOOTH * self._period, SENDER) / self._pace)
+        path, soft = [], -math.expm1(-2.0 * math.pi * corner)
         for _ in range(samples):
-            first += self._soft * (towards - first)
-            second += self._soft * (first - second)
+            first += soft * (towards - first)
+            second += soft * (first - second)
             path.append((first, second))
         return path
 

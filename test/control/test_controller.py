@@ -79,20 +79,28 @@ def sender(shape, rng):
     at, due = np.arange(4 * int(RATE)), np.arange(-2.0, 4 * RATE + 2.0) + 0.2
     if shape == "pauses":
         due = due[(np.arange(len(due)) % 90 > 2)]
+    elif shape == "now and then":
+        due = np.cumsum(np.where(rng.random(len(due)) < 0.7, 1.0, rng.uniform(2.0, 14.0, len(due)))) - 2.0
     elif shape == "late":
         due = due - 0.6 + rng.uniform(-0.3, 0.3, len(due))
     return due[np.searchsorted(due, at + 0.5) - 1] - at
 
 
-@pytest.mark.parametrize(("shape", "most"), [("pauses", 30.0), ("late", 14.0)])
-def test_a_sender_that_is_not_in_time_is_not_answered_by_the_motor(shape, most):
-    """A jitter of 0.36 ms, as of every program that sleeps, was 65 N m at the motor for 10 N m at 5 Hz."""
+@pytest.mark.parametrize(
+    ("shape", "hz", "most", "off_by"),
+    [("pauses", 5.0, 20.0, 1.0), ("late", 5.0, 14.0, 1.0), ("now and then", 1.0, 13.0, 2.5)],
+)
+def test_a_sender_that_is_not_in_time_is_not_answered_by_the_motor(shape, hz, most, off_by):
+    """A jitter of 0.36 ms, as of every program that sleeps, was 65 N m at the motor for 10 N m at 5 Hz.
+
+    Pauses of 7 to 50 ms, as of a Python program on a busy machine, were 28 N m for 10 N m at 1 Hz.
+    """
     off, loop = sender(shape, np.random.default_rng(3)), controller()
     ft, torques = play(
-        RIG, len(off), lambda k, read: loop.step(read, wave(k + off[k]), desired_offset=off[k])
+        RIG, len(off), lambda k, read: loop.step(read, wave(k + off[k], hz=hz), desired_offset=off[k])
     )
     assert np.abs(torques[140:]).max() < most
-    assert np.abs(ft - [wave(k) for k in range(len(ft))])[140:].max() < 1.0
+    assert np.abs(ft - [wave(k, hz=hz) for k in range(len(ft))])[140:].max() < off_by
 
 
 def test_a_desired_torque_that_is_not_renewed_comes_to_rest_near_its_last_value():
