@@ -54,19 +54,20 @@ class LinkMotion:
         self._pole = math.exp(-2.0 * math.pi * share.corner * law.period)
         self.start(math.nan)
 
-    def start(self, angle: float) -> None:
-        """Begin at an angle of the link against the housing, rad, of unknown speed; nan: not known."""
-        self._angle, self._speed, self._torque, self._since = angle, math.nan, 0.0, 0
+    def start(self, angle: float | None) -> None:
+        """Begin at an angle of the link against the housing, rad, of unknown speed; nan, None: not known."""
+        self._angle = math.nan if angle is None else angle
+        self._speed, self._torque, self._since = math.nan, 0.0, 0
 
-    def torque(self, angle: float, expected: float, missed: int = 0, offset: float = 0.0) -> float:
+    def torque(self, angle: float | None, expected: float, missed: int = 0, offset: float = 0.0) -> float:
         """Return the torque, N m, for the motion of the sample that ends.
 
-        angle: rad; nan: not measured, and the torque fades. expected: rad/s, the learned load's speed.
+        angle: rad; nan, None: not measured, and the torque fades. expected: rad/s, the learned load's speed.
         missed: samples that were lost before. offset: samples by which the angle was read after its place.
         """
         self._since, wanted = self._since + 1 + missed, 0.0
         moving = self._speed if math.isfinite(self._speed) else 0.0
-        placed = angle - offset * self._period * (moving + expected)
+        placed = (math.nan if angle is None else angle) - offset * self._period * (moving + expected)
         if math.isfinite(placed):
             if math.isfinite(self._angle) and self._since <= BRIDGED:
                 time = self._since * self._period

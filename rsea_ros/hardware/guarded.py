@@ -151,7 +151,7 @@ class GuardedDevice:
         self.state: State | None = None
         self.lifted: list[str] = []
         self.away = self._inferred = self._off = self._off_due = False
-        self._reached, self._jumped = -math.inf, 0.0
+        self._reached, self._jumped, self._moved = -math.inf, 0.0, 0.0
         self._turn, self._tare = threading.Lock(), threading.Lock()
         self._losses = {transfer: Losses(limits.lost_cycles) for transfer in ("read", "write")}
 
@@ -177,8 +177,8 @@ class GuardedDevice:
         otherwise and for a limit of what it does not measure or cannot do, DeviceError; nothing stays open.
         """
         self.device.open()
-        self.state, self._inferred, self.guard.limits, self._jumped = None, False, self._limits, 0.0
-        self._off, self._off_due = True, False
+        self.state, self._inferred, self.guard.limits = None, False, self._limits
+        self._off, self._off_due, self._jumped, self._moved = True, False, 0.0, 0.0
         for losses in self._losses.values():
             losses.clear()
         try:
@@ -289,7 +289,7 @@ class GuardedDevice:
         step, most = state.position - before.position, self._furthest(time)
         if not abs(step) > most:
             return None
-        self._jumped += step
+        self._jumped, self._moved = self._jumped + step, self._moved + most
         return DeviceFault("position_step", abs(step), most, "rad", f"in {time:.3g} s")
 
     def _furthest(self, time: float) -> float:
@@ -407,7 +407,7 @@ class GuardedDevice:
         if fault is not None:
             self.guard.trip(fault)
             raise DeviceError(f"{fault} is still there, expected it to be over")
-        if abs(self._jumped) > self._furthest(self._period):
+        if abs(self._jumped) > self._moved:  # what may have been motion in the jumps, there and back
             raise DeviceError(f"position jumped by {self._jumped:.3g} rad, expected cleanup and configure")
 
     def _switch_on(self) -> None:

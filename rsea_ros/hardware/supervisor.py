@@ -100,23 +100,41 @@ def watch(place: int, line: Line, timeout: float, *, acknowledged: bool) -> None
 def report(text: str) -> None:
     """Tell whoever can still be told."""
     syslog.syslog(syslog.LOG_CRIT, f"rsea supervisor: {text}")
+    tell(text)
+
+
+def tell(text: str) -> None:
+    """Write a line, where there is one and anybody reads it."""
     with contextlib.suppress(OSError):
-        os.write(2, f"supervisor: {text}\n".encode())
+        os.write(2, f"supervisor: {text}\n".encode() if text else b"")
+
+
+ORDER = 5.0
+"""s in which a connection must say what it wants: one that says nothing is nobody's."""
 
 
 def serve(connection: socket.socket) -> None:
-    """Watch one driver over its connection until it is gone."""
+    """Watch one driver over its connection until it is gone; what sends no order is no driver."""
     with connection:
-        words, (descriptor, *_), _, _ = socket.recv_fds(connection, 65536, 1)
-        order = json.loads(words)
-        with contextlib.suppress(OSError):  # a driver that has died meanwhile
-            connection.sendall(b"ready\n")
+        connection.settimeout(ORDER)
         try:
+            words, descriptors, _, _ = socket.recv_fds(connection, 65536, 1)
+        except OSError:
+            return
+        try:
+            order = json.loads(words)
             frames, replies = (list(map(bytes.fromhex, order.get(n, []))) for n in ("frames", "replies"))
-            line = Line(descriptor, frames, replies)
-            watch(connection.fileno(), line, float(order["timeout"]), acknowledged=bool(replies))
+            line, timeout = Line(descriptors[0], frames, replies), float(order["timeout"])
+        except (AttributeError, LookupError, TypeError, ValueError):
+            tell(f"{len(words)} bytes that are no order, expected a driver's" if words else "")
+        else:
+            connection.settimeout(None)
+            with contextlib.suppress(OSError):  # a driver that has died meanwhile
+                connection.sendall(b"ready\n")
+            watch(connection.fileno(), line, timeout, acknowledged=bool(replies))
         finally:
-            os.close(descriptor)
+            for descriptor in descriptors:
+                os.close(descriptor)
 
 
 def listen(path: str) -> None:
@@ -128,7 +146,13 @@ def listen(path: str) -> None:
         os.chmod(path, 0o660)
         place.listen()
         while True:
-            threading.Thread(target=serve, args=(place.accept()[0],), daemon=True).start()
+            try:
+                connection = place.accept()[0]
+            except OSError as error:  # of too many files: those that it guards must not lose it
+                tell(f"a connection was not accepted: {error}")
+                time.sleep(1.0)
+            else:
+                threading.Thread(target=serve, args=(connection,), daemon=True).start()
 
 
 def main() -> None:

@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 from rsea_ros.hardware.device import Spring, State
 from rsea_ros.hardware.interlock import DeviceFault
-from rsea_ros.records.record import is_measured
+from rsea_ros.records.record import HUGE, is_measured
 
 SMOOTH, MEMORY = 0.03, 0.5
 """s: time constants of low-pass and window. Above 5 Hz a delay of the velocity makes a false momentum."""
@@ -111,7 +111,7 @@ class Witnesses:
             return None
         self._idle = 0 if torque != 0.0 else self._idle + 1
         signals = self._signals(before, state, state.wrench[self._spring.place], time)
-        if not is_measured(signals.ft + signals.motor):
+        if math.isnan(signals.ft + signals.motor) or any(abs(x) > HUGE for x in signals):
             return None
         if self._low is None or math.isnan(signals.spring) != math.isnan(self._low.spring):
             self._begin()

@@ -22,6 +22,7 @@ from rsea_ros.nodes._devices import limits_of, spring_of, witnesses_of
 from rsea_ros.nodes._drive import DriverCycle
 from rsea_ros.nodes._health import ERROR, OK, WARN, Health, NodeHealth
 from rsea_ros.nodes._joints import Jobs
+from rsea_ros.nodes._qos import COMMAND
 
 LOST = {"failed_reads": "reads lost", "failed_writes": "writes lost"}
 OVERTAKING = 0.05
@@ -276,7 +277,9 @@ class Offer:
     ) -> None:  # fmt: skip
         self._node, self._jobs, self._name, self._work, self._after = node, jobs, name, work, after
         self._at_once = at_once
-        self._service = node.create_service(Trigger, f"~/{name}", self._serve, callback_group=jobs.group)
+        self._service = node.create_service(
+            Trigger, f"~/{name}", self._serve, qos_profile=COMMAND, callback_group=jobs.group
+        )  # a queue of ten leaves forty of fifty callers without an answer
 
     def take_up(self) -> None:
         """Take up the requests that wait, in the executor's thread."""

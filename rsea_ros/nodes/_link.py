@@ -22,7 +22,7 @@ from rsea_ros.nodes._commands import CommandQueue, Obeyed
 from rsea_ros.nodes._cycle import Anchor
 from rsea_ros.nodes._mailbox import Mailbox, MessageFields
 from rsea_ros.nodes._qos import COMMAND, MEASUREMENT
-from rsea_ros.records.record import NONSENSE, is_measured
+from rsea_ros.records.record import HUGE, NONSENSE, is_measured
 
 LOUD = 0.02
 """Of torque_limit: RMS of the torque that the noise of both encoders may make."""
@@ -112,6 +112,7 @@ class Measurements:
     encoder: checks `deflection`; None: that topic is not heard.
     limit: the largest torque, N m.
     unusable: readings that were not finite, or of NONSENSE times the limit, and messages of several joints.
+    senders: of each topic, of which one at a time is heard.
     """
 
     def __init__(
@@ -124,20 +125,23 @@ class Measurements:
         self._waiting_fts: deque[tuple[int, float]] = deque(maxlen=WAITING)
         self.desired, self._most = CommandQueue(limit=limit), NONSENSE * limit
         self.unusable = self._heard = 0
+        self.senders = {what: Obeyed() for what in ("joint_states", "wrenches", "desired torques")}
+        admit = {what: sender.admit for what, sender in self.senders.items()}
         state = (("position", 0), ("velocity", 0), ("effort", 0))
         states = MessageFields(JOINT_STATE, state, joint)
-        self._states = Mailbox(node, "joint_states", states, MEASUREMENT, self._refuse)
+        self._states = Mailbox(
+            node, "joint_states", states, MEASUREMENT, self._refuse, admit=admit["joint_states"]
+        )
         wrench = MessageFields(WRENCH, (("wrench", along),))
-        self._fts = Mailbox(node, "ft", wrench, MEASUREMENT, self._refuse)
+        self._fts = Mailbox(node, "ft", wrench, MEASUREMENT, self._refuse, admit=admit["wrenches"])
         self._encoder, self._before = encoder, 0
         self._waiting_deflections: deque[tuple[int, float]] = deque(maxlen=WAITING)
         self._deflection = (0, math.nan)
         angle = MessageFields(JOINT_STATE, (("position", 0),), joint)
         self._deflections = encoder and Mailbox(node, "deflection", angle, MEASUREMENT, lambda: None)
         torque = MessageFields(JOINT_STATE, (("effort", 0),), joint)
-        self.obeyed = Obeyed()
         self._desired = Mailbox(
-            node, "desired_torque", torque, COMMAND, self.desired.refuse, admit=self.obeyed.admit
+            node, "desired_torque", torque, COMMAND, self.desired.refuse, admit=admit["desired torques"]
         )
         self.subscriptions = [self._states.subscription, self._fts.subscription]
 
@@ -158,7 +162,7 @@ class Measurements:
                 self._waiting_fts.popleft()
                 continue
             self._waiting_states.popleft()
-            if is_measured(torque, self._most) and is_measured(velocity) and is_measured(position):
+            if is_measured(torque, self._most) and all(is_measured(x, HUGE) for x in (position, velocity)):
                 ft_age = (stamp - at) / self._period
                 link = self._link(stamp, torque, position, ft_age) if self._encoder else math.nan
                 yield stamp, Measurement(torque, velocity, position, effort, ft_age, link)

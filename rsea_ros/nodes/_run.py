@@ -105,7 +105,14 @@ class Component:
 
     def run(self) -> int:
         """Run one node in this process and return the exit status."""
-        return run_nodes([self], remove_ros_args(sys.argv)[1:])
+        return run_nodes([self], own_arguments())
+
+
+def own_arguments() -> list[str]:
+    """Return the command line without ROS's arguments; nothing where ROS can't read them and will say so."""
+    with suppress(RuntimeError):
+        return list(remove_ros_args(sys.argv)[1:])
+    return []
 
 
 class Member:

@@ -65,7 +65,7 @@ class ControllerNode(Program):
         self._fault, self._told_fault, self._release = "", "", (0, 0.0)
         self._wished = self._held = False
         self._steps = self._missed = self._limited = self._late = self._late_reported = self._restarts = 0
-        self._told_losses = self._ignored_reported = 0
+        self._told_losses, self._told_ignored = 0, dict[str, int]()
         self._squares: list[float] = []
         self._commands = node.create_publisher(JointState, "torque_command", COMMAND)
         template = serialize_message(torque_command_message(0, 0.0, values["joint"]))
@@ -252,6 +252,7 @@ class ControllerNode(Program):
         squares, self._squares = self._squares, []
         worst = min(self._design.margins.values(), key=lambda m: m.phase)
         share = self._controller.share
+        ignored = {what: sender.ignored for what, sender in self._inputs.senders.items()}
         values = {
             "desired": f"{self._desired.torque:.3f}",
             "torque_command": f"{self._torque:.3f}",
@@ -273,13 +274,14 @@ class ControllerNode(Program):
             "delay_margin_samples": f"{worst.delay:.2f}",
             "desired_watchdog_trips": self._desired.expired,
             "refused_desired": self._desired.refused,
-            "ignored_desired": self._inputs.obeyed.ignored,
+            "ignored_desired": ignored["desired torques"],
+            "ignored_measurements": ignored["joint_states"] + ignored["wrenches"],
         }
         warnings = [*filter(None, [self._limits.contradiction]), *self._loss_words()]
-        ignored = self._inputs.obeyed.ignored
-        new, self._ignored_reported = ignored - self._ignored_reported, ignored
-        if new:
-            warnings.append(f"{new} desired torques of a second publisher ignored")
+        for what, count in ignored.items():
+            if new := count - self._told_ignored.get(what, 0):
+                warnings.append(f"{new} {what} of a second publisher ignored")
+        self._told_ignored = ignored
         new, self._late_reported = self._late - self._late_reported, self._late
         if new:
             warnings.insert(0, f"{new} commands more than a sample late, with less feedback")

@@ -13,12 +13,11 @@ from typing import Any
 
 from rclpy.executors import Executor
 from rclpy.parameter import Parameter
-from rclpy.utilities import remove_ros_args
 
 from rsea_ros.documents.wording import did_you_mean
 from rsea_ros.errors import ParameterError
 from rsea_ros.nodes._health import STEADY
-from rsea_ros.nodes._run import BAD_INPUT, NAMESPACE, TICK, Component, Member, run_nodes
+from rsea_ros.nodes._run import BAD_INPUT, NAMESPACE, TICK, Component, Member, own_arguments, run_nodes
 from rsea_ros.plugins import node_modules
 
 USUAL = ("driver", "controller", "model")
@@ -58,7 +57,7 @@ def compose(
 
 def main() -> int:
     """Run the nodes named on the command line, by default those of USUAL."""
-    words = remove_ros_args(sys.argv)[1:]
+    words = own_arguments()
     kinds = [word for word in words if not word.startswith("-")] or USUAL
     try:
         return run_nodes([*map(component, kinds)], [word for word in words if word.startswith("-")])

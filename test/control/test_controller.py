@@ -254,6 +254,28 @@ def test_a_restart_under_a_desired_torque_lets_the_error_in_slowly(lost):
     assert ft[-1] == pytest.approx(10.0, abs=1.5)
 
 
+def test_a_desired_torque_that_ceases_for_a_sample_is_no_fall_and_no_overshoot():
+    """As of a sender that pauses for 50 ms. The limit stood at the torque of the restart: 15.5 N m."""
+    loop = TorqueController(RIG, RATE)
+
+    def answer(k, read):
+        if k in (140, 141):
+            loop.start(read, 10.0 * (k == 141))
+        return loop.step(read, 10.0 * (k != 140))
+
+    ft, torques = play(RIG, 250, answer)
+    assert np.abs(torques[130:]).max() < 12.5 and ft[130:].min() > 9.0
+
+
+@pytest.mark.parametrize("wrong", [{"velocity": 20.0}, {"velocity": -1e3}, {"velocity": 9e5}, {"link": None}])
+def test_a_speed_that_no_torque_of_the_motor_reaches_is_a_lost_sample(wrong):
+    """One of 1000 rad/s, as of another sender, took 68 N m for 0.1 s, one of 9e5 for 2 s."""
+    loop = controller()
+    answer = lambda k, read: loop.step(replace(read, **wrong) if k == 120 else read, 5.0)  # noqa: E731
+    ft, torques = play(RIG, 200, answer)
+    assert np.abs(torques[100:]).max() < 6.5 and np.abs(ft[100:] - 5.0).max() < 0.3
+
+
 @pytest.mark.parametrize("bad", [math.nan, -1e4])
 @pytest.mark.parametrize("name", ["ft", "velocity", "position", "motor_torque", "ft_age", "desired", *TIMING])
 def test_one_value_that_is_no_measurement_is_a_lost_sample(name, bad):

@@ -4,12 +4,13 @@ import configparser
 import json
 import math
 import os
+import resource
 import signal
 import socket
 import subprocess
 import sys
 import threading
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from pathlib import Path
 
 import pytest
@@ -249,6 +250,34 @@ def calls(monkeypatch):
     monkeypatch.setattr(supervisor, "serve", lambda connection: made.append(("serve", connection)))
     monkeypatch.setattr(supervisor.socket, "socket", lambda **options: options)
     return made
+
+
+def test_a_service_outlives_strangers_and_too_many_of_them(tmp_path):
+    """It ended with the sixtieth connection that said nothing, and a driver lost its guard."""
+    path = str(tmp_path / "guard")
+    words, few = [sys.executable, supervisor.__file__, "--listen", path], (20, 20)
+    service = subprocess.Popen(
+        words, stderr=subprocess.PIPE, preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_NOFILE, few)
+    )
+    with service, ExitStack() as kept:
+        kept.callback(service.kill)
+        assert until(lambda: os.path.exists(path))
+
+        def connect():
+            place = kept.enter_context(socket.socket(socket.AF_UNIX))
+            place.connect(path)
+            return place
+
+        strangers = [connect() for _ in range(60)]
+        assert b"was not accepted" in service.stderr.readline()
+        for stranger in strangers:
+            stranger.close()
+        connect().sendall(b"x" * 5000)
+        assert any(b"5000 bytes that are no order" in line for line in iter(service.stderr.readline, b""))
+        driver = connect()
+        socket.send_fds(driver, [b'{"timeout": 1.0, "frames": ["00"]}'], [driver.fileno()])
+        assert driver.recv(6) == b"ready\n"
+        driver.sendall(b"q")
 
 
 def test_a_service_listens_at_its_path_and_outlives_the_terminal(calls, monkeypatch):

@@ -57,6 +57,16 @@ def play(guarded, now, wave, torque, seconds, *, until_fault=False, rate=RATE):
     return guarded.contradiction, k / rate
 
 
+def test_a_reading_of_no_actuator_is_no_witness():
+    """A position of 1e155 rad ended the controller with an OverflowError."""
+    guarded, _, _ = bench(RIG)
+    witnesses = guarded._testify(guarded._rating)
+    for k in range(400):
+        state = State(round(k * SECOND / RATE), 0.005, 0.0, 8.0, 0, (0.0,) * 5 + (7.65,))
+        assert witnesses.take(replace(state, position=1e155) if k == 300 else state, 8.0) is None
+    assert not witnesses.words
+
+
 def falsify(device, monkeypatch, gain=1.0, bias=0.0):
     read = device.read
 

@@ -33,7 +33,8 @@ def made(monkeypatch):
         n: SimpleNamespace(crossover=c, phase=p, gain=g, delay=d) for n, (c, p, g, d) in margins.items()
     })  # fmt: skip
     node._link = SimpleNamespace(encoder=None, reason="link is false")
-    node._inputs = SimpleNamespace(unusable=2, obeyed=Obeyed(), hear_desired=lambda anchor: None)
+    senders = {what: Obeyed() for what in ("joint_states", "wrenches", "desired torques")}
+    node._inputs = SimpleNamespace(unusable=2, senders=senders, hear_desired=lambda anchor: None)
     node._desired = SimpleNamespace(
         torque=1.5, stamp=1000, expired=3, refused=4, age=lambda now: None,
         take=lambda until: calls.append(until) or [],
@@ -65,7 +66,7 @@ def made(monkeypatch):
     node._last, node._heard, node._watched, node._lag, node._torque = 900, now[0], 0, 0.0, 4.0
     node._fault, node._told_fault, node._release = "", "", (0, 0.0)
     node._wished, node._held, node._squares = True, False, [4.0, 16.0]
-    node._told_losses = node._ignored_reported = 0
+    node._told_losses, node._told_ignored = 0, {}
     node._steps = node._missed = node._limited = node._late = node._late_reported = node._restarts = 0
     return node, now, out, calls
 
@@ -230,13 +231,16 @@ def test_the_report_has_the_state_and_its_warnings(made):
         "link": "not used: link is false", "clock": "fine", "crossover_hz": "30.00",
         "phase_margin_deg": "45.0", "gain_margin_db": "8.0", "delay_margin_samples": "1.25",
         "desired_watchdog_trips": 3, "refused_desired": 4, "ignored_desired": 0,
+        "ignored_measurements": 0,
     }  # fmt: skip
     assert node._report().values["error_rms"] == "none"
     node._limits.contradiction = "ft 10, K times deflection 15.8 N·m contradict each other"
     assert node._report()[:2] == (WARN, node._limits.contradiction)
     node._limits.contradiction = ""
-    node._inputs.obeyed.ignored = 3
-    assert node._report()[:2] == (WARN, "3 desired torques of a second publisher ignored")
+    node._inputs.senders["desired torques"].ignored = 3
+    node._inputs.senders["wrenches"].ignored = 2
+    told = "2 wrenches of a second publisher ignored; 3 desired torques of a second publisher ignored"
+    assert node._report()[:2] == (WARN, told)
     node._late = 5
     assert node._report()[:2] == (WARN, "5 commands more than a sample late, with less feedback")
     assert node._report().level == OK

@@ -81,6 +81,14 @@ def test_zero_ft_is_refused_under_torque_and_takes_the_offset_away_without(wire,
     assert wire.trigger("clear_fault").success
 
 
+def test_fifty_stops_at_once_are_answered(wire, listener):
+    """A queue of ten lost 36 of them, and their callers waited for ever."""
+    assert wire.trigger("stop").success
+    answers = [wire.request("stop") for _ in range(50)]
+    listener.until(lambda: all(answer.done() for answer in answers))
+    assert wire.trigger("clear_fault").success
+
+
 def test_a_fault_is_published_keeps_excite_away_and_ends_by_service(wire, listener, start):
     """It played to the end, and the recording showed a machine that never moved."""
     told = "temperature: 90 °C, limit 70 °C"
