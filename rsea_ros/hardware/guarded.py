@@ -290,6 +290,8 @@ class GuardedDevice:
         if not abs(step) > most:
             return None
         self._jumped, self._moved = self._jumped + step, self._moved + most
+        if abs(self._jumped) <= self._moved:  # it is back, but for what may have been motion, as of a spring
+            self._jumped = self._moved = 0.0
         return DeviceFault("position_step", abs(step), most, "rad", f"in {time:.3g} s")
 
     def _furthest(self, time: float) -> float:
@@ -407,7 +409,7 @@ class GuardedDevice:
         if fault is not None:
             self.guard.trip(fault)
             raise DeviceError(f"{fault} is still there, expected it to be over")
-        if abs(self._jumped) > self._moved:  # what may have been motion in the jumps, there and back
+        if self._jumped:
             raise DeviceError(f"position jumped by {self._jumped:.3g} rad, expected cleanup and configure")
 
     def _switch_on(self) -> None:

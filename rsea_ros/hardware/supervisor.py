@@ -13,6 +13,7 @@ anything that kills driver and children together (a control group, a container, 
 import contextlib
 import json
 import os
+import resource
 import select
 import signal
 import socket
@@ -97,36 +98,31 @@ def watch(place: int, line: Line, timeout: float, *, acknowledged: bool) -> None
         armed = beats.endswith(b"a")
 
 
-def report(text: str) -> None:
+def report(text: str, urgency: int = syslog.LOG_CRIT) -> None:
     """Tell whoever can still be told."""
-    syslog.syslog(syslog.LOG_CRIT, f"rsea supervisor: {text}")
-    tell(text)
-
-
-def tell(text: str) -> None:
-    """Write a line, where there is one and anybody reads it."""
+    syslog.syslog(urgency, f"rsea supervisor: {text}")
     with contextlib.suppress(OSError):
-        os.write(2, f"supervisor: {text}\n".encode() if text else b"")
+        os.write(2, f"supervisor: {text}\n".encode())
 
 
-ORDER = 5.0
-"""s in which a connection must say what it wants: one that says nothing is nobody's."""
+ORDER, SELECTED, OWN = 1.0, 1024, 10
+"""s in which a connection must send an order, as long as a driver waits for the answer. Descriptors that
+`select` takes; the service's own. A driver has two."""
 
 
 def serve(connection: socket.socket) -> None:
     """Watch one driver over its connection until it is gone; what sends no order is no driver."""
+    words, descriptors = b"", list[int]()
     with connection:
-        connection.settimeout(ORDER)
         try:
             words, descriptors, _, _ = socket.recv_fds(connection, 65536, 1)
-        except OSError:
-            return
-        try:
             order = json.loads(words)
             frames, replies = (list(map(bytes.fromhex, order.get(n, []))) for n in ("frames", "replies"))
             line, timeout = Line(descriptors[0], frames, replies), float(order["timeout"])
-        except (AttributeError, LookupError, TypeError, ValueError):
-            tell(f"{len(words)} bytes that are no order, expected a driver's" if words else "")
+            select.select((), (connection,), (), timeout)  # raises for what is no time
+        except Exception as error:  # whatever a stranger sends
+            if words:
+                report(f"{len(words)} bytes that are no driver's order: {error}", syslog.LOG_WARNING)
         else:
             connection.settimeout(None)
             with contextlib.suppress(OSError):  # a driver that has died meanwhile
@@ -138,9 +134,13 @@ def serve(connection: socket.socket) -> None:
 
 
 def listen(path: str) -> None:
-    """Serve every driver that connects to a Unix socket, each in a thread, until a signal ends it."""
+    """Serve every driver that connects to a Unix socket, each in a thread, until a signal ends it.
+
+    What it guards it guards on, whoever else comes: a connection for which there is no room is closed.
+    """
     with contextlib.suppress(FileNotFoundError):
         os.unlink(path)
+    most = (min(resource.getrlimit(resource.RLIMIT_NOFILE)[0], SELECTED) - OWN) // 2
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as place:
         place.bind(path)
         os.chmod(path, 0o660)
@@ -148,11 +148,18 @@ def listen(path: str) -> None:
         while True:
             try:
                 connection = place.accept()[0]
-            except OSError as error:  # of too many files: those that it guards must not lose it
-                tell(f"a connection was not accepted: {error}")
-                time.sleep(1.0)
-            else:
+            except OSError as error:
+                report(f"no connection is accepted: {error}", syslog.LOG_WARNING)
+                time.sleep(ORDER)
+                continue
+            connection.settimeout(ORDER)
+            try:
+                if threading.active_count() > most:
+                    raise RuntimeError(f"there are {most}")
                 threading.Thread(target=serve, args=(connection,), daemon=True).start()
+            except RuntimeError as error:  # also where no thread can be started
+                report(f"a connection is refused: {error}", syslog.LOG_WARNING)
+                connection.close()
 
 
 def main() -> None:

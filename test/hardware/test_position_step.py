@@ -94,11 +94,16 @@ def test_a_jump_is_cleared_once_the_position_is_where_it_was_and_not_before(mean
         joint.read()
     with pytest.raises(DeviceError, match="position jumped by 1 rad, expected cleanup and configure"):
         joint.clear()
-    device.turn(500 / 280.0, 0.025, 0.0)  # as of a spring that relaxed meanwhile
+    for k in range(500, 700):  # back, again and again, but for what a spring relaxed meanwhile
+        device.turn(k / 280.0, 1.0 * (k % 2) + 0.025, 0.0)
+        joint.read()
+    device.turn(700 / 280.0, 0.025, 0.0)
     joint.read()
     assert joint.clear() and joint.fault is None
-    device.turn(501 / 280.0, 1.0, 0.0)
+    device.turn(701 / 280.0, 1.0, 0.0)
     joint.read()
+    with pytest.raises(DeviceError, match=r"position jumped by 0\.975 rad"):
+        joint.clear()
     joint.open()
     joint.read()
     assert joint.fault is None

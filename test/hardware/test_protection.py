@@ -4,7 +4,6 @@ import configparser
 import json
 import math
 import os
-import resource
 import signal
 import socket
 import subprocess
@@ -252,32 +251,42 @@ def calls(monkeypatch):
     return made
 
 
-def test_a_service_outlives_strangers_and_too_many_of_them(tmp_path):
-    """It ended with the sixtieth connection that said nothing, and a driver lost its guard."""
-    path = str(tmp_path / "guard")
-    words, few = [sys.executable, supervisor.__file__, "--listen", path], (20, 20)
-    service = subprocess.Popen(
-        words, stderr=subprocess.PIPE, preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_NOFILE, few)
-    )
+GARBAGE = (b"x" * 5000, b"[" * 5000, b"\xff", b"[]", b'{"timeout": NaN}', b'{"timeout": 1, "frames": ["zz"]}')
+
+
+def test_a_service_guards_on_whatever_strangers_do(tmp_path):
+    """It ended with the descriptors that 60 of them took; each that was no driver left a traceback."""
+    path, log = str(tmp_path / "socket"), tmp_path / "log"
+    script = f"ulimit -n 40; exec {sys.executable} {supervisor.__file__} --listen {path} 2> {log}"
+    service = subprocess.Popen(["bash", "-c", script])
+    assert until(lambda: os.path.exists(path))
+
+    def connect(words=b"", *descriptors):
+        place = kept.enter_context(socket.socket(socket.AF_UNIX))
+        place.settimeout(5.0)
+        place.connect(path)
+        if words:
+            socket.send_fds(place, [words], descriptors)
+        return place
+
     with service, ExitStack() as kept:
         kept.callback(service.kill)
-        assert until(lambda: os.path.exists(path))
-
-        def connect():
-            place = kept.enter_context(socket.socket(socket.AF_UNIX))
-            place.connect(path)
-            return place
-
-        strangers = [connect() for _ in range(60)]
-        assert b"was not accepted" in service.stderr.readline()
-        for stranger in strangers:
-            stranger.close()
-        connect().sendall(b"x" * 5000)
-        assert any(b"5000 bytes that are no order" in line for line in iter(service.stderr.readline, b""))
-        driver = connect()
-        socket.send_fds(driver, [b'{"timeout": 1.0, "frames": ["00"]}'], [driver.fileno()])
+        motor, port = map(kept.enter_context, socket.socketpair())
+        order = json.dumps({"timeout": 60.0, "frames": [b"zero".hex()]}).encode()
+        driver = connect(order, port.fileno())
         assert driver.recv(6) == b"ready\n"
-        driver.sendall(b"q")
+        strangers = [connect() for _ in range(60)]
+        assert {stranger.recv(1) for stranger in strangers} == {b""}
+        for words in GARBAGE:
+            assert connect(words, port.fileno()).recv(1) == b"", words
+        connect().close()
+        assert connect(order, port.fileno()).recv(6) == b"ready\n"
+        driver.close()
+        assert motor.recv(4) == b"zero" and service.poll() is None
+    told = log.read_text().splitlines()
+    assert sum("a connection is refused: there are 15" in line for line in told) == 46
+    assert sum("bytes that are no driver's order" in line for line in told) == len(GARBAGE)
+    assert len(told) == 46 + len(GARBAGE)
 
 
 def test_a_service_listens_at_its_path_and_outlives_the_terminal(calls, monkeypatch):

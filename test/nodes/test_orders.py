@@ -268,7 +268,7 @@ class Desk:
         joint._offers += self.offers.values()
         monkeypatch.setattr(_joint.time, "sleep", lambda seconds: self.cycles(14))
 
-    def _service(self, kind, name, serve, callback_group):
+    def _service(self, kind, name, serve, qos_profile, callback_group):
         return SimpleNamespace(handle=Waiting(), serve=serve, send_response=lambda response, header: None)
 
     async def _do(self, work):

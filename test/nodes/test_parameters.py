@@ -111,6 +111,14 @@ def test_every_node_refuses_what_is_wrong_in_one_line_with_status_2(name, signal
     assert_refused(name, "".join(capfd.readouterr()).splitlines())
 
 
+@pytest.mark.parametrize("name", ["joint", "model"])
+def test_what_ros_cannot_read_is_refused_in_words_with_status_2(name, signals, monkeypatch, capfd):
+    monkeypatch.setattr(sys, "argv", [name, "--ros-args", "-r", "__ns:=/_0/a1__b"])
+    assert importlib.import_module(f"rsea_ros.nodes.{name}").main() == 2
+    *_, last = "".join(capfd.readouterr()).splitlines()
+    assert "FATAL" in last and "ROS arguments" in last and "__ns:=/_0/a1__b" in last
+
+
 def test_a_node_that_is_interrupted_while_it_imports_says_so_in_one_line():
     code = "import rsea_ros.nodes\nraise KeyboardInterrupt"
     done = subprocess.run([sys.executable, "-c", code], cwd=CONFIG.parents[1], capture_output=True, text=True)
