@@ -75,7 +75,7 @@ FOLLOWED = 0.25
 STALE = 0.05
 """s without a usable reading after which there is no torque; the next one starts anew."""
 ERRING = 1.0
-"""rad/s, by which encoders err. What is faster than REACH times what the largest torque reaches was not
+"""rad/s, by which encoders err. What is faster than REACH times what the motor's torque reaches was not
 measured: one sample of 1000 rad/s took 68 N m for 0.1 s (decision 393)."""
 SMALL = 0.01
 """Of the largest torque: an error at a start that is let in without teaching loads. For twice the ramp a
@@ -148,8 +148,8 @@ class TorqueController:
         self._compensation: Compensation = compensation(rig, settings.compensate)
         self._prediction, self._acted = Prediction(settings.corner, 1.0 / rate), Acted(1.0 / rate)
         self._most = NONSENSE * max(limits.torque, 1.0)
-        damping = self._law.damping
-        self._fastest = min(REACH * limits.torque / damping + ERRING, HUGE) if damping else HUGE
+        able, damping = max(limits.torque, motor_torque(rig)[0]), self._law.damping
+        self._fastest = min(REACH * able / damping + ERRING, HUGE) if damping else HUGE
         self._preview, self._learn, self._limits = settings.preview, settings.learn, limits
         self._positions: list[float] | None = None if settings.velocity else []
         self._link = LinkMotion(self._law, link, FOLLOWED * limits.torque)

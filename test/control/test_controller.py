@@ -269,8 +269,12 @@ def test_a_desired_torque_that_ceases_for_a_sample_is_no_fall_and_no_overshoot()
 
 @pytest.mark.parametrize("wrong", [{"velocity": 20.0}, {"velocity": -1e3}, {"velocity": 9e5}, {"link": None}])
 def test_a_speed_that_no_torque_of_the_motor_reaches_is_a_lost_sample(wrong):
-    """One of 1000 rad/s, as of another sender, took 68 N m for 0.1 s, one of 9e5 for 2 s."""
+    """One of 1000 rad/s, as of another sender, took 68 N m for 0.1 s, one of 9e5 for 2 s.
+
+    The motor's, not the limit's: under a limit of 3 N m a hand may still turn it at 2 rad/s.
+    """
     loop = controller()
+    assert controller(limits=TorqueLimits(3.0))._is_usable(Measurement(0.0, 2.0, 0.0))
     answer = lambda k, read: loop.step(replace(read, **wrong) if k == 120 else read, 5.0)  # noqa: E731
     ft, torques = play(RIG, 200, answer)
     assert np.abs(torques[100:]).max() < 6.5 and np.abs(ft[100:] - 5.0).max() < 0.3
