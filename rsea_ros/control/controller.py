@@ -250,10 +250,8 @@ class TorqueController:
         return (3.0 * position - 4.0 * known[0] + known[1]) / (2.0 * h)
 
     def _is_usable(self, r: Measurement) -> bool:
-        return is_measured(r.ft, self._most) and all(
-            is_measured(value, most)
-            for value, most in ((r.velocity, self._fastest), (r.position, HUGE), (r.ft_age, HUGE))
-        )
+        bounds = (r.ft, self._most), (r.velocity, self._fastest), (r.position, HUGE), (r.ft_age, HUGE)
+        return all(is_measured(value, most) for value, most in bounds)
 
     def _bridge(self, missed: int) -> float:
         """Return the torque, N m, for a sample that says nothing: the last one, zero once it is stale."""

@@ -279,7 +279,7 @@ class Offer:
         self._at_once = at_once
         self._service = node.create_service(
             Trigger, f"~/{name}", self._serve, qos_profile=COMMAND, callback_group=jobs.group
-        )  # a queue of ten leaves forty of fifty callers without an answer
+        )  # ROS's own queue of ten left 36 of 50 callers without an answer
 
     def take_up(self) -> None:
         """Take up the requests that wait, in the executor's thread."""

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from msg_adapters.ros import JointState, stamp_of, torque_command_message
-from rsea_ros.control.controller import LinkShare
 from rsea_ros.control.following import closed_loop
+from rsea_ros.control.link import LinkShare
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig, save_rig
 from rsea_ros.nodes._control import TABLE, controller_of, design_of, with_limits
