@@ -4,6 +4,7 @@ import configparser
 import json
 import math
 import os
+import shlex
 import signal
 import socket
 import subprocess
@@ -257,7 +258,8 @@ GARBAGE = (b"x" * 5000, b"[" * 5000, b"\xff", b"[]", b'{"timeout": NaN}', b'{"ti
 def test_a_service_guards_on_whatever_strangers_do(tmp_path):
     """It ended with the descriptors that 60 of them took; each that was no driver left a traceback."""
     path, log = str(tmp_path / "socket"), tmp_path / "log"
-    script = f"ulimit -n 40; exec {sys.executable} {supervisor.__file__} --listen {path} 2> {log}"
+    words = shlex.join([sys.executable, supervisor.__file__, "--listen", path])
+    script = f"ulimit -n 40; exec {words} 2> {shlex.quote(str(log))}"
     service = subprocess.Popen(["bash", "-c", script])
     assert until(lambda: os.path.exists(path))
 
