@@ -12,6 +12,7 @@ import functools
 import importlib
 import json
 import os
+import select
 import shutil
 import signal
 import subprocess
@@ -20,9 +21,7 @@ import tempfile
 import time
 import traceback
 from collections.abc import Sequence
-from contextlib import suppress
 from pathlib import Path
-from types import FrameType
 
 from rsea_ros.hardware.peer.remote import RemoteBench
 
@@ -119,36 +118,35 @@ class Child:
 
 
 def serve(folder: Path) -> None:
-    """Be the parent until nobody asks any more. What only nodes need is loaded for the first of them."""
+    """Be the parent until nobody asks any more. What only nodes need is loaded for the first of them.
+
+    Ends are heard by descriptors: a signal between the last look for one and the read of a wish is lost.
+    """
     load_bench()
-    running: set[int] = set()
-
-    def reap(number: int, frame: FrameType | None) -> None:
-        for pid in sorted(running):
-            with suppress(ChildProcessError):  # one call interrupts another, and has reaped it
-                ended, status = os.waitpid(pid, os.WNOHANG)
-                if not ended:
-                    continue
-                running.discard(pid)
-                (folder / f"{pid}.new").write_text(str(os.waitstatus_to_exitcode(status)))
-                (folder / f"{pid}.new").rename(folder / str(pid))
-
-    signal.signal(signal.SIGCHLD, reap)
-    for line in sys.stdin:
+    running: dict[int, int] = {}
+    while True:
+        ready, _, _ = select.select([sys.stdin, *running], [], [])
+        for descriptor in running.keys() & set(ready):
+            pid, status = os.waitpid(running.pop(descriptor), 0)
+            os.close(descriptor)
+            (folder / f"{pid}.new").write_text(str(os.waitstatus_to_exitcode(status)))
+            (folder / f"{pid}.new").rename(folder / str(pid))
+        if sys.stdin not in ready:
+            continue
+        line = sys.stdin.readline()
+        if not line:
+            break
         wish = json.loads(line)
         if wish["module"].startswith(("rsea_ros.nodes.", "rsea_extras.watch.", "quick_")):
             prepare()
-        signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGCHLD])
         pid = os.fork()
         if pid == 0:
             become(**wish)
         (folder / str(pid)).unlink(missing_ok=True)
-        running.add(pid)
+        running[os.pidfd_open(pid)] = pid
         sys.stdout.write(f"{pid}\n")
         sys.stdout.flush()
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGCHLD])
-    signal.signal(signal.SIGCHLD, signal.SIG_DFL)
-    for pid in running:
+    for pid in running.values():
         os.kill(pid, signal.SIGKILL)
     shutil.rmtree(folder)
 
@@ -208,8 +206,6 @@ def hurry_reports() -> None:
 
 def become(module: str, words: list[str], environment: dict[str, str], files: list[str]) -> None:
     """Be a program, in a fork, as `python -m` would; this does not return."""
-    signal.signal(signal.SIGCHLD, signal.SIG_DFL)
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGCHLD])
     os.setsid()
     for stream, (path, flags) in enumerate(zip(files, FLAGS, strict=False)):
         opened = os.open(path, flags)
