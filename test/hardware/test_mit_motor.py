@@ -58,9 +58,10 @@ class Virtual:
                 continue
             heard = message.arbitration_id, message.is_extended_id, bytes(message.data)
             self.heard.append(heard)
-            for drive in self.drives:
-                for identity, extended, data in drive.hear(time.monotonic_ns(), heard):
-                    self.tell(identity, data, extended)
+            now = time.monotonic_ns()
+            answers = [answer for drive in self.drives for answer in drive.hear(now, heard)]
+            for identity, extended, data in answers:  # at once: twins answer within one frame of each other
+                self.tell(identity, data, extended)
 
     def tell(self, identity, data=b"", extended=False, error=False):
         """Send a frame to the host."""
