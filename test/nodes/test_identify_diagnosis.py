@@ -35,7 +35,7 @@ def bag(tmp_path_factory):
 def identify(bag, start, listener, tmp_path_factory):
     """The node after it has heard the run, and its directory."""
     out = tmp_path_factory.mktemp("identify")
-    node = start("quick_identify", rig=RIG, out=out, reliable=True, stay=True, quiet=0.2)
+    node = start("quick_identify", rig=RIG, out=out, reliable=True, stay=True, quiet=1.0)
     replay = start("replay", bag=bag, rate=10.0, subscribers=1)
     listener.until(lambda: not replay.is_running())
     assert replay.wait() == 0, replay.output

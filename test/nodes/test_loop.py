@@ -45,7 +45,7 @@ def test_replay_keeps_stamps_and_gives_identify_everything(bag, start, listener,
     clock = listener.hear(Clock, "/clock", MEASUREMENT)
     states = listener.hear(JointState, "/rsea/joint_states", RECORD_RELIABLE)
     listener.hear(JointState, "/rsea/torque_command", RECORD_RELIABLE)
-    identify = start("identify", rig=RIG, out=tmp_path, reliable=True, quiet=0.2)
+    identify = start("identify", rig=RIG, out=tmp_path, reliable=True, quiet=1.0)
     replay = start("replay", bag=bag, rate=10.0, subscribers=2)
     listener.until(lambda: listener.node.count_publishers("/clock"))  # of which nobody sends ticks again
     listener.hear(WrenchStamped, "/rsea/ft", RECORD_RELIABLE)  # the last that it waits for
