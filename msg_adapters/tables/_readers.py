@@ -1,7 +1,7 @@
 """A separate program: `_readers.py FORMAT FILE LIMIT PLACES` reads columns of a MAT or Parquet file.
 
 It imports nothing of this package, so that it starts fast and may be killed at any moment: SciPy's reader can
-crash on a damaged file, or ask for any amount of memory, and that ends only this process. See child.py.
+crash on a damaged file, or ask for any amount of memory, and that ends only this one. See column_files.py.
 """
 
 import json

@@ -11,8 +11,7 @@ import numpy as np
 
 from msg_adapters.tables.column_files import read_columns
 from msg_adapters.tables.column_table import CHANNELS, LINEAR, Table, canonical, unit
-from msg_adapters.tables.import_map import ImportMap, RowFilter
-from msg_adapters.tables.map_terms import ChannelTerm
+from msg_adapters.tables.import_map import ChannelTerm, ImportMap, RowFilter
 from msg_adapters.tables.raw_codes import raw_code
 from rsea_ros.documents.strict_yaml import is_decimal
 from rsea_ros.documents.units import in_motion, plain

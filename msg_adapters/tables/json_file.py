@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from msg_adapters.tables.child import ElementAddress, finite_table, place_of
-from msg_adapters.tables.column_table import Table, Wanted, check_size, checked_lengths, index_of
+from msg_adapters.tables import column_table
+from msg_adapters.tables.column_table import ElementAddress, Table, Wanted, index_of, place_of
 from msg_adapters.tables.text_file import seconds_of
 from rsea_ros.documents.wording import brief, no_utf_8, quote
 
@@ -50,11 +50,11 @@ def read_json(path: Path, wanted: Wanted) -> Table:
         for c in cells
         if c not in labels
     }
-    check_size(len(next(iter(cells.values()))), len(cells))
-    checked_lengths({column: len(c) for column, c in cells.items()})
+    column_table.check_size(len(next(iter(cells.values()))), len(cells))
+    column_table.checked_lengths({column: len(c) for column, c in cells.items()})
     numbers = np.repeat(np.arange(1.0, len(lengths) + 1), lengths)
     trials = (_list_of(document, next(iter(places.values())).base), numbers) if lengths else None
-    return finite_table(vectors, labels=labels, dated=dated, trials=trials)
+    return column_table.finite_table(vectors, labels=labels, dated=dated, trials=trials)
 
 
 def _document(path: Path) -> Any:

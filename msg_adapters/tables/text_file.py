@@ -17,8 +17,8 @@ from typing import IO, cast
 
 import numpy as np
 
-from msg_adapters.tables.child import base_and_index, number_in
-from msg_adapters.tables.column_table import Labels, Table, Wanted, check_size, index_of
+from msg_adapters.tables import column_table
+from msg_adapters.tables.column_table import Labels, Table, Wanted, base_and_index, index_of
 from rsea_ros.documents.strict_yaml import is_decimal
 from rsea_ros.documents.wording import brief, quote
 from rsea_ros.records.record import FloatArray
@@ -305,7 +305,7 @@ class _Reader:
         if not rows:
             return
         self._rows += len(rows)
-        check_size(self._rows, len(self._indices))
+        column_table.check_size(self._rows, len(self._indices))
         values = None if self._has_lists else self._fast([line for _, line in rows])
         cells = self._careful(rows) if values is None else values.T
         for parts, part in zip(self._parts.values(), cells, strict=True):
@@ -378,7 +378,7 @@ class _Reader:
         if element is None:
             return _value(line, column, cell, self._decimal)
         try:
-            number = number_in(cell, element)
+            number = column_table.number_in(cell, element)
         except ValueError as error:
             raise ValueError(f"line {line}, column {column!r} is {quote(cell)}, {error}") from None
         return _value(line, column, number, self._decimal)

@@ -12,9 +12,9 @@ import pytest
 from bad_input import forked
 from map_files import CSV, MAP
 
-from msg_adapters.tables import child, import_record, load_map
+from msg_adapters.tables import column_files, import_record, load_map
 
-PROGRAM = str(child.PROGRAM)
+PROGRAM = str(column_files.PROGRAM)
 
 
 @pytest.fixture(autouse=True)
@@ -34,7 +34,7 @@ def readers_in_forks(monkeypatch):
 
         return SimpleNamespace(returncode=forked(read))
 
-    monkeypatch.setattr(child, "subprocess", SimpleNamespace(**{**vars(subprocess), "run": run}))
+    monkeypatch.setattr(column_files, "subprocess", SimpleNamespace(**{**vars(subprocess), "run": run}))
 
 
 @pytest.fixture

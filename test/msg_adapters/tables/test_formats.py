@@ -11,7 +11,7 @@ import pyarrow.parquet as pq
 import pytest
 from scipy.io import savemat
 
-from msg_adapters.tables import child, column_files, json_file
+from msg_adapters.tables import column_files, json_file
 from msg_adapters.tables.column_files import read_columns
 from rsea_ros.errors import ImportMapError
 
@@ -288,15 +288,15 @@ def test_version_7_3_is_named(tmp_path, head):
 def test_a_reader_that_fails_is_one_line(tmp_path, monkeypatch, program, message):
     (tmp_path / "child.py").write_text(program)
     savemat(tmp_path / "run.mat", {"x": np.arange(5.0)})
-    monkeypatch.setattr(child, "PROGRAM", tmp_path / "child.py")
-    monkeypatch.setattr(child, "SECONDS", 0.3 if "while" in program else 20.0)
+    monkeypatch.setattr(column_files, "PROGRAM", tmp_path / "child.py")
+    monkeypatch.setattr(column_files, "SECONDS", 0.3 if "while" in program else 20.0)
     with pytest.raises(ImportMapError, match=message):
         read_columns(tmp_path / "run.mat", ["x"])
 
 
 def test_a_file_that_declares_more_than_memory_is_refused(tmp_path, monkeypatch):
     """A vector of a hundred million numbers that the file does not hold, declared in its header."""
-    monkeypatch.setattr(child, "subprocess", subprocess)  # which has limits
+    monkeypatch.setattr(column_files, "subprocess", subprocess)  # which has limits
     savemat(tmp_path / "run.mat", {"x": np.arange(5.0)})
     data = (tmp_path / "run.mat").read_bytes()
     shape = np.array([1, 5], "<i4").tobytes()

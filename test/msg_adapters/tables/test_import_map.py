@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from map_files import CSV, MAP
 
-from msg_adapters.tables import import_record, load_map, map_terms
+from msg_adapters.tables import import_map, import_record, load_map
 from msg_adapters.tables.column_table import FACTORS
 from msg_adapters.tables.expression import FUNCTIONS
 from rsea_ros.documents.strict_yaml import table
@@ -155,9 +155,9 @@ MEANINGS = {
     "reference_velocity": "target velocity of a MIT frame",
 }
 SECTIONS = {
-    "map": map_terms.MAP, "time": map_terms.TIME, "where": map_terms.WHERE, "runs": map_terms.RUNS,
-    "channels": [replace(key, meaning=MEANINGS[key.name]) for key in map_terms.CHANNEL],
-    "channels.NAME": map_terms.TERM,
+    "map": import_map.MAP, "time": import_map.TIME, "where": import_map.WHERE, "runs": import_map.RUNS,
+    "channels": [replace(key, meaning=MEANINGS[key.name]) for key in import_map.CHANNEL],
+    "channels.NAME": import_map.TERM,
 }  # fmt: skip
 
 
