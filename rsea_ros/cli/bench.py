@@ -11,10 +11,9 @@ from dataclasses import replace
 from pathlib import Path
 from shlex import quote
 
-from rsea_ros.cli._output import path
+from rsea_ros.cli._options import RIG, path
 from rsea_ros.cli._processes import parameters_of_bench
 from rsea_ros.cli._terminal import whole_number
-from rsea_ros.cli._topics import RIG
 from rsea_ros.errors import ParameterError
 from rsea_ros.hardware.peer.can_drive import DRIVES, EmulatedCan, EmulatedDrive
 from rsea_ros.hardware.peer.ft import ForceSensor, Misbehaviour

@@ -13,9 +13,7 @@ from rich.console import Console
 
 from msg_adapters import TopicMap, read_record
 from msg_adapters.topic_map import AXES
-from rsea_ros.cli import _terminal
-from rsea_ros.cli._output import FOUND, add_force, path, provenance, results_place
-from rsea_ros.cli._topics import add_runs, add_topic_options, cut, rig_choice, topic_map
+from rsea_ros.cli import _options, _terminal
 from rsea_ros.errors import RseaError
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.records.record import Channel, Record
@@ -30,13 +28,15 @@ EXAMPLE = "rsea check run.mcap --rig my_bench.yaml"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    add_runs(parser)
+    _options.add_runs(parser)
     add = parser.add_argument
     add("--json", action="store_true", help="print the findings as JSON (docs/check.md) and nothing else")
-    add("--out", type=path, help="directory for report.html and check.json (default: none is written)")
-    add_force(parser)
-    add("--fail-on", choices=("red", "amber"), help=f"exit status {FOUND} if a light is this one or worse")
-    add_topic_options(parser, window=True)
+    about = "directory for report.html and check.json (default: none is written)"
+    add("--out", type=_options.path, help=about)
+    _options.add_force(parser)
+    about = f"exit status {_options.FOUND} if a light is this one or worse"
+    add("--fail-on", choices=("red", "amber"), help=about)
+    _options.add_topic_options(parser, window=True)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -44,17 +44,17 @@ def run(args: argparse.Namespace) -> int:
     from rsea_ros.checks.finding import LIGHTS, worst
     from rsea_ros.report import check as page
 
-    rig, topics = load_rig(args.rig), topic_map(args)
-    place = results_place(args, args.out, CHECK, [*args.bags, args.rig]) if args.out else None
-    records = [cut(read_record([bag], topics=topics, strict=False), args) for bag in args.bags]
+    rig, topics = load_rig(args.rig), _options.topic_map(args)
+    place = _options.results_place(args, args.out, CHECK, [*args.bags, args.rig]) if args.out else None
+    records = [_options.cut(read_record([bag], topics=topics, strict=False), args) for bag in args.bags]
 
     checks = []
     for bag, record in zip(args.bags, records, strict=True):
         others = partial(other_axes, bag, topics, args)
         found = check_record(record, rig, topics.axis, others, values=True)
-        checks.append(replace(found, rig_choice=rig_choice(args)))
+        checks.append(replace(found, rig_choice=_options.rig_choice(args)))
     if place:
-        report = page.write_check(checks, records, place, provenance("check", args.bags, args.rig))
+        report = page.write_check(checks, records, place, _options.provenance("check", args.bags, args.rig))
     if args.json:
         print(json.dumps(page.check_json(checks), indent=1, allow_nan=False, ensure_ascii=False))
     else:
@@ -63,7 +63,7 @@ def run(args: argparse.Namespace) -> int:
             print(report)
     light = worst([c.light for c in checks])
     fails = args.fail_on is not None and LIGHTS.index(light) >= LIGHTS.index(args.fail_on)
-    return FOUND if fails else 0
+    return _options.FOUND if fails else 0
 
 
 def other_axes(bag: str, topics: TopicMap, args: argparse.Namespace) -> Mapping[str, Channel]:
@@ -75,7 +75,7 @@ def other_axes(bag: str, topics: TopicMap, args: argparse.Namespace) -> Mapping[
         except RseaError:
             continue
         if "ft" in record:
-            axes[axis] = cut(record, args)["ft"]
+            axes[axis] = _options.cut(record, args)["ft"]
     return axes
 
 

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 from rich.table import Table
 
-from rsea_ros.cli._output import add_json, add_results, print_file, provenance, results_place
+from rsea_ros.cli._options import RIG, add_json, add_results, print_file, provenance, results_place
 from rsea_ros.cli._terminal import progress
-from rsea_ros.cli._topics import RIG
 from rsea_ros.design.motor_gear_units import catalogue
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.rig import Rig, motor_torque

@@ -14,10 +14,9 @@ import numpy as np
 
 from msg_adapters import read_record
 from msg_adapters.bags import read_contents
-from rsea_ros.cli._output import path
+from rsea_ros.cli._options import RIG, path
 from rsea_ros.cli._processes import Processes, need_ros, parameters_of_bench
 from rsea_ros.cli._terminal import columns, progress, say, whole_number
-from rsea_ros.cli._topics import RIG
 from rsea_ros.documents import strict_yaml
 from rsea_ros.documents.units import plain
 from rsea_ros.effects.catalogue import effect_named

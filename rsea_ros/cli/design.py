@@ -6,8 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from rsea_ros.cli import _output
-from rsea_ros.cli._output import path
+from rsea_ros.cli import _options
 from rsea_ros.cli._terminal import say
 from rsea_ros.design.mechanism import UNITS, Requirement
 from rsea_ros.design.motor_gear_units import PAPERS, unit_named
@@ -46,9 +45,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     about = "the part beside the spring; housing: held by the gear output, an RT-RSEA (default %(default)s)"
     add("--beside-spring", choices=PARTS, default=PARTS[0], help=about)
     about = "YAML of motor-gear units (default config/design/motor_gear_units.yaml)"
-    add("--catalogue", type=path, help=about)
-    _output.add_results(parser, f"{DESIGN_JSON} and {REPORT}", "out/design")
-    _output.add_json(parser, DESIGN_JSON)
+    add("--catalogue", type=_options.path, help=about)
+    _options.add_results(parser, f"{DESIGN_JSON} and {REPORT}", "out/design")
+    _options.add_json(parser, DESIGN_JSON)
     add("--fail-on", choices=["unmet"], help="exit status 1 if the stiffness misses a demand")
 
 
@@ -56,7 +55,7 @@ def run(args: argparse.Namespace) -> int:
     from rsea_ros.design import spring_design as springs
     from rsea_ros.report import design as page
 
-    place = _output.results_place(args, "out/design", (DESIGN_JSON, REPORT), [args.catalogue])
+    place = _options.results_place(args, "out/design", (DESIGN_JSON, REPORT), [args.catalogue])
     values = {name: getattr(args, name) for name in DEMANDS}
     requirement = Requirement(**{**values, "deflection": math.radians(args.deflection)})
     unit = unit_named(args.unit, args.catalogue)
@@ -69,12 +68,12 @@ def run(args: argparse.Namespace) -> int:
         asked = springs.spring_design(requirement, unit, stated)
     enough = springs.robust_stiffness(requirement, unit)
     robust = springs.spring_design(requirement, unit, enough) if math.isfinite(enough) else None
-    source = _output.provenance("design", [args.catalogue] if args.catalogue else [])
+    source = _options.provenance("design", [args.catalogue] if args.catalogue else [])
     with NewFiles(place) as new:
         path = new.write(DESIGN_JSON, json_text(page.design_json(asked, least, robust)))
         report = new.write(REPORT, page.design_report(asked, least, robust, source))
     if args.json:
-        _output.print_file(path)
+        _options.print_file(path)
     else:
         _print(asked, least, robust, report)
     return 1 if args.fail_on and not asked.feasible else 0

@@ -9,7 +9,7 @@ from rich.console import Console
 
 from msg_adapters import TopicMap, read_record
 from msg_adapters.records import write_overlay
-from rsea_ros.cli import _output, _terminal, _topics
+from rsea_ros.cli import _options, _terminal
 from rsea_ros.cli.check import check_records
 from rsea_ros.diagnosis.result import Diagnosis, Verdict
 from rsea_ros.diagnosis.settings import MOST_CAUSES, DiagnosisSettings
@@ -31,22 +31,22 @@ _MUCH = 0.2
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
-    _topics.add_runs(parser, "several runs of one bench")
-    _topics.add_conditions(parser)
+    _options.add_runs(parser, "several runs of one bench")
+    _options.add_conditions(parser)
     add("--holdout", metavar="BAG", help="a run for testing only (default: a quarter of the runs, in blocks)")
     about = "a run of the machine after one cause was taken out of it: is it predicted without that cause?"
     add("--edited", metavar="BAG", help=about)
     add("--without-cause", metavar="EFFECT", help="the cause that was taken out of the machine of --edited")
     about = "add the smallest size of each effect that these runs would have shown: does the alarm work?"
     add("--smallest", action="store_true", help=about)
-    _output.add_results(parser, ", ".join(DIAGNOSIS), "out/diagnose-BAG")
+    _options.add_results(parser, ", ".join(DIAGNOSIS), "out/diagnose-BAG")
     about = "effects to leave out of the search"
     add("--without", nargs="+", action="extend", default=[], metavar="EFFECT", help=about)
     most = "largest number of causes (default %(default)s)"
     add("--max-causes", type=int, default=MOST_CAUSES, metavar="N", help=most)
-    _output.add_json(parser, DIAGNOSIS_JSON)
-    _output.add_fail_on(parser, (*get_args(Verdict), FAULTS, _topics.OFF_RIG), _FINDINGS)
-    _topics.add_topic_options(parser, window=True)
+    _options.add_json(parser, DIAGNOSIS_JSON)
+    _options.add_fail_on(parser, (*get_args(Verdict), FAULTS, _options.OFF_RIG), _FINDINGS)
+    _options.add_topic_options(parser, window=True)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -54,12 +54,12 @@ def run(args: argparse.Namespace) -> int:
         raise ParameterError("--edited BAG and --without-cause EFFECT: one is given, expected both or none")
     files, default = [*args.bags, *args.conditions], f"diagnose-{Path(args.bags[0]).stem}"
     inputs = [*files, args.rig, args.holdout, args.edited]
-    place = _output.results_place(args, Path("out") / default, DIAGNOSIS, inputs)
-    rig, topics = _topics.rig_of(args, args.holdout, args.edited), _topics.topic_map(args)
+    place = _options.results_place(args, Path("out") / default, DIAGNOSIS, inputs)
+    rig, topics = _options.rig_of(args, args.holdout, args.edited), _options.topic_map(args)
     with _terminal.progress("diagnose") as tell:
         tell("reading", 0.0)
         runs = [*args.bags, *([args.holdout] if args.holdout else [])]
-        _topics.each_once([*runs, *([args.edited] if args.edited else [])])
+        _options.each_once([*runs, *([args.edited] if args.edited else [])])
         records = [readable(bag, topics, args) for bag in runs]
         records += [readable(args.edited, topics)] if args.edited else []
         raw, records = records[0], check_records(records, rig, topics.axis, quiet=args.json, masks=True)
@@ -71,7 +71,7 @@ def run(args: argparse.Namespace) -> int:
 
         without = args.without_cause and effect_named(args.without_cause).name
         settings = DiagnosisSettings(args.max_causes, tuple(effect_named(name).name for name in args.without))
-        choice = _topics.rig_choice(args)
+        choice = _options.rig_choice(args)
         result = replace(diagnose(records, rig, holdout, tell, settings), rig_choice=choice)
         if args.smallest:
             from rsea_ros.diagnosis.smallest_change import smallest_changes
@@ -86,16 +86,16 @@ def run(args: argparse.Namespace) -> int:
                 result = replace(result, edit=edited(result, changed, without))
             except ParameterError as error:  # the diagnosis stands
                 refused = error
-        origin = _output.provenance("diagnose", files, args.rig)
+        origin = _options.provenance("diagnose", files, args.rig)
         report = write_diagnosis(result, raw, place, write_overlay, origin)
     if args.json:
-        _output.print_file(report.parent / DIAGNOSIS_JSON)
+        _options.print_file(report.parent / DIAGNOSIS_JSON)
     else:
         _print(result, report)
     if refused is not None:
         raise refused
-    findings = {result.verdict, *([FAULTS] if result.faults else []), *_topics.off_rig(result.remarks)}
-    return _output.FOUND if findings.intersection(args.fail_on) else 0
+    findings = {result.verdict, *([FAULTS] if result.faults else []), *_options.off_rig(result.remarks)}
+    return _options.FOUND if findings.intersection(args.fail_on) else 0
 
 
 def readable(bag: str, topics: TopicMap, args: argparse.Namespace | None = None) -> Record:
@@ -106,7 +106,7 @@ def readable(bag: str, topics: TopicMap, args: argparse.Namespace | None = None)
     from rsea_ros.checks.carried import check_diagnosable
 
     record = bound_values(read_record([bag], topics=topics, strict=False))
-    record = record if args is None else _topics.cut(record, args)
+    record = record if args is None else _options.cut(record, args)
     check_diagnosable(record)
     return record
 

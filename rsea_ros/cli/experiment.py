@@ -8,9 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rsea_ros.cli import _output
+from rsea_ros.cli import _options
 from rsea_ros.cli._terminal import positive, progress, say, whole_number
-from rsea_ros.cli._topics import add_topic_options, topic_map
 from rsea_ros.cli.diagnose import readable
 from rsea_ros.documents import strict_yaml
 from rsea_ros.documents.units import plain
@@ -44,10 +43,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--longest", type=positive, default=10.0, help="longest duration of the run, s (default %(default)g)")
     shapes = "number of shapes to compare (default %(default)s)"
     add("--refine", type=whole_number, default=24, metavar="N", help=shapes)
-    _output.add_results(parser, ", ".join(EXPERIMENT), "out/experiment")
-    _output.add_json(parser, EXPERIMENT_JSON)
-    _output.add_fail_on(parser, (NO_RUN,))
-    add_topic_options(parser)
+    _options.add_results(parser, ", ".join(EXPERIMENT), "out/experiment")
+    _options.add_json(parser, EXPERIMENT_JSON)
+    _options.add_fail_on(parser, (NO_RUN,))
+    _options.add_topic_options(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -55,7 +54,7 @@ def run(args: argparse.Namespace) -> int:
     from rsea_ros.experiment.proposal import DesignRequest
     from rsea_ros.identification.solver import worker_pools
 
-    place = _output.results_place(args, Path("out") / "experiment", EXPERIMENT, [*args.models, *args.bag])
+    place = _options.results_place(args, Path("out") / "experiment", EXPERIMENT, [*args.models, *args.bag])
     shortest = args.shortest or min(0.5, args.longest)
     asked = DesignRequest(limits_from(args.limits), args.rate, shortest, args.longest, refine=args.refine)
     models = [model for path in args.models for model in models_in(path)]
@@ -65,10 +64,10 @@ def run(args: argparse.Namespace) -> int:
         advice = replace(advise(hypotheses, asked, noise, pools.run, tell), excluded=excluded)
     report = write_advice(advice, place, args)
     if args.json:
-        _output.print_file(report.parent / EXPERIMENT_JSON)
+        _options.print_file(report.parent / EXPERIMENT_JSON)
     else:
         _print(advice, report)
-    return _output.FOUND if NO_RUN in args.fail_on and advice.proposal is None else 0
+    return _options.FOUND if NO_RUN in args.fail_on and advice.proposal is None else 0
 
 
 def models_in(path: str) -> list[ModelFile]:
@@ -104,7 +103,7 @@ def _possible(
         return hypotheses_from(models), {}, {}
     first = models[0].rig
     rig = first.with_effects(*(e for e in first.effects if e.name != models[0].name))
-    records = [readable(bag, topic_map(args)) for bag in args.bag]
+    records = [readable(bag, _options.topic_map(args)) for bag in args.bag]
     weighing = weigh(records, rig, [m.name for m in models if m.name != NOTHING], run=run)
     likely = weighing.hypotheses()
     kept = [h for h in likely if h.probability >= Rules.possible] or likely[:1]
@@ -115,7 +114,7 @@ def _possible(
 def write_advice(advice: Advice, place: Destination, args: argparse.Namespace) -> Path:
     from rsea_ros.report.experiment import advice_json, advice_page
 
-    source = _output.provenance("experiment", args.bag)
+    source = _options.provenance("experiment", args.bag)
     with NewFiles(place) as new:
         if advice.proposal is not None:
             new.write(COMMANDS, run_text(advice.proposal.command, advice.proposal.rate))

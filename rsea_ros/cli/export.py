@@ -11,7 +11,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rsea_ros.cli._output import FOUND, add_force, path, provenance
+from rsea_ros.cli._options import FOUND, add_force, path, provenance
 from rsea_ros.cli._terminal import positive, say
 from rsea_ros.documents.strict_yaml import load
 from rsea_ros.documents.units import plain

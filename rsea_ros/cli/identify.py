@@ -8,7 +8,7 @@ from typing import get_args
 from rich.console import Console
 
 from msg_adapters import read_record
-from rsea_ros.cli import _output, _terminal, _topics
+from rsea_ros.cli import _options, _terminal
 from rsea_ros.cli._terminal import progress, say
 from rsea_ros.cli.check import check_records
 from rsea_ros.identification.result import Identification, Verdict
@@ -20,36 +20,36 @@ EXAMPLE = "rsea identify run.mcap --rig my_bench.yaml --out results"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    _topics.add_runs(parser)
-    _topics.add_conditions(parser)
-    _output.add_results(parser, ", ".join(IDENTIFICATION), "out/identify-BAG")
-    _output.add_json(parser, IDENTIFICATION_JSON)
-    findings = (*get_args(Verdict), _topics.OFF_RIG)
-    _output.add_fail_on(parser, findings, " (a fitted value is far from the rig's)")
-    _topics.add_topic_options(parser, window=True)
+    _options.add_runs(parser)
+    _options.add_conditions(parser)
+    _options.add_results(parser, ", ".join(IDENTIFICATION), "out/identify-BAG")
+    _options.add_json(parser, IDENTIFICATION_JSON)
+    findings = (*get_args(Verdict), _options.OFF_RIG)
+    _options.add_fail_on(parser, findings, " (a fitted value is far from the rig's)")
+    _options.add_topic_options(parser, window=True)
 
 
 def run(args: argparse.Namespace) -> int:
     default = Path("out") / f"identify-{Path(args.bags[0]).stem}"
     files = [*args.bags, *args.conditions]
-    place = _output.results_place(args, default, IDENTIFICATION, [*files, args.rig])
-    rig, topics = _topics.rig_of(args), _topics.topic_map(args)
+    place = _options.results_place(args, default, IDENTIFICATION, [*files, args.rig])
+    rig, topics = _options.rig_of(args), _options.topic_map(args)
     with progress("identify") as tell:
         tell("reading", 0.0)
-        bags = _topics.each_once(args.bags)
-        records = [_topics.cut(read_record([bag], topics=topics), args) for bag in bags]
+        bags = _options.each_once(args.bags)
+        records = [_options.cut(read_record([bag], topics=topics), args) for bag in bags]
         records = check_records(records, rig, topics.axis, quiet=args.json, masks=False)
         from rsea_ros.identification.identify import identify  # 0.7 s: a refused bag need not wait for it
         from rsea_ros.report.identification import write_results
 
-        result = replace(identify(records, rig, tell), rig_choice=_topics.rig_choice(args))
-        report = write_results(result, place, _output.provenance("identify", files, args.rig))
+        result = replace(identify(records, rig, tell), rig_choice=_options.rig_choice(args))
+        report = write_results(result, place, _options.provenance("identify", files, args.rig))
     if args.json:
-        _output.print_file(report.parent / IDENTIFICATION_JSON)
+        _options.print_file(report.parent / IDENTIFICATION_JSON)
     else:
         _print(result, report)
-    findings = {result.verdict, *_topics.off_rig(result.remarks)}
-    return _output.FOUND if findings.intersection(args.fail_on) else 0
+    findings = {result.verdict, *_options.off_rig(result.remarks)}
+    return _options.FOUND if findings.intersection(args.fail_on) else 0
 
 
 def _print(result: Identification, report: Path) -> None:

@@ -7,9 +7,8 @@ from shlex import quote
 
 from msg_adapters import write_record
 from msg_adapters.tables import Imported, ImportMap, guess_map, import_records, load_map, summary
-from rsea_ros.cli._output import add_force
+from rsea_ros.cli._options import add_force, add_topic_options, topic_map
 from rsea_ros.cli._terminal import say, whole_numbers
-from rsea_ros.cli._topics import add_topic_options, topic_map
 from rsea_ros.cli.maps import map_path
 from rsea_ros.errors import OutputError, ParameterError
 from rsea_ros.outputs.files import Destination, NewFiles, check_free, write_file

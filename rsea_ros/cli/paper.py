@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from rsea_ros.cli._output import add_json, add_results, path, print_file, results_place
+from rsea_ros.cli._options import add_json, add_results, path, print_file, results_place
 from rsea_ros.cli._terminal import progress, whole_number
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.rig_file import load_rig

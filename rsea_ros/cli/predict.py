@@ -9,8 +9,7 @@ from typing import NoReturn
 import numpy as np
 
 from msg_adapters import read_record
-from rsea_ros.cli._output import add_force
-from rsea_ros.cli._topics import add_topic_options, cut, topic_map
+from rsea_ros.cli._options import add_force, add_topic_options, cut, topic_map
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.prediction_errors import predict
 from rsea_ros.model.rig_file import load_rig

@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 from shlex import quote
 
-from rsea_ros.cli._output import add_force, path
+from rsea_ros.cli._options import add_force, path
 from rsea_ros.cli._terminal import columns, say
 from rsea_ros.documents.units import plain
 from rsea_ros.documents.wording import list_names

@@ -7,9 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from msg_adapters import write_record
-from rsea_ros.cli._output import add_force
+from rsea_ros.cli._options import add_force, add_topic_options, topic_map
 from rsea_ros.cli._terminal import say, whole_number
-from rsea_ros.cli._topics import add_topic_options, topic_map
 from rsea_ros.documents.strict_yaml import is_decimal
 from rsea_ros.documents.wording import quote
 from rsea_ros.effects.catalogue import catalogue, effect_named

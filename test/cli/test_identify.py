@@ -11,7 +11,7 @@ import pytest
 import rsea_ros as rsea
 from msg_adapters import TopicMap, write_record
 from rsea_ros.cli import diagnose, identify
-from rsea_ros.cli._topics import rig_choice, topic_map
+from rsea_ros.cli._options import rig_choice, topic_map
 from rsea_ros.cli.main import attach_axis, main
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.report.remark_words import command
