@@ -7,19 +7,13 @@ import importlib
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import rcl_interfaces.msg as rcl
 import yaml
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import WrenchStamped
 from lifecycle_msgs.srv import ChangeState, GetAvailableTransitions, GetState
-from rcl_interfaces.msg import (
-    FloatingPointRange,
-    IntegerRange,
-    Parameter,
-    ParameterDescriptor,
-    ParameterEvent,
-    SetParametersResult,
-)
+from rcl_interfaces.msg import Parameter, ParameterDescriptor, ParameterEvent, SetParametersResult
 from rcl_interfaces.srv import GetParameters, ListParameters
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
@@ -135,9 +129,9 @@ def parameter_descriptor(
         description=description, additional_constraints=constraints, read_only=fixed
     )
     if bounds is not None and isinstance(bounds[0], int):
-        descriptor.integer_range = [IntegerRange(from_value=bounds[0], to_value=int(bounds[1]))]
+        descriptor.integer_range = [rcl.IntegerRange(from_value=bounds[0], to_value=int(bounds[1]))]
     elif bounds is not None:
-        descriptor.floating_point_range = [FloatingPointRange(from_value=bounds[0], to_value=bounds[1])]
+        descriptor.floating_point_range = [rcl.FloatingPointRange(from_value=bounds[0], to_value=bounds[1])]
     return descriptor
 
 

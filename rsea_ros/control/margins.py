@@ -12,20 +12,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rsea_ros.control.law import (
-    FT,
-    VELOCITY,
-    FeedbackLaw,
-    FeedbackState,
-    Gains,
-    Sampled,
-    feedback,
-    hold,
-    law_of,
-    responses,
-    sample_rig,
-    z_of,
-)
+from rsea_ros.control import law as laws
+from rsea_ros.control.law import FT, VELOCITY, FeedbackLaw, FeedbackState, Gains, Sampled, feedback, z_of
 from rsea_ros.control.uncertainty import BenchVariant, lags_of, lock, mode_of, variant_rig
 from rsea_ros.model import outputs
 from rsea_ros.model.equations import COORDINATES, D
@@ -155,7 +143,7 @@ def _step(law: FeedbackLaw, plant: Sampled, x: FloatArray, s: FeedbackState, sha
     y = plant.c @ x
     ft, velocity = float(y[FT]), float(y[VELOCITY])
     torque, after = feedback(law, s, -ft, -velocity, ft, velocity)
-    return np.concatenate([plant.a @ x + plant.b * s.newest, hold(after, share * torque)])
+    return np.concatenate([plant.a @ x + plant.b * s.newest, laws.hold(after, share * torque)])
 
 
 @dataclass(frozen=True)
@@ -204,7 +192,7 @@ def distal_responses(rig: Rig, rate: float, hz: FloatArray) -> Moved:
     s = np.asarray(2j * np.pi * hz, dtype=np.complex128)
     torque, speed = _without_motor(rig, hz, s)
     spring = -(rig["spring.stiffness"] / s + rig["spring.damping"])
-    return Moved(hz, responses(sample_rig(lock(rig), rate), hz), torque, speed, spring)
+    return Moved(hz, laws.responses(laws.sample_rig(lock(rig), rate), hz), torque, speed, spring)
 
 
 def moved_bench(rig: Rig, rate: float, hz: FloatArray, case: BenchVariant) -> Moved:
@@ -217,7 +205,7 @@ def moved_bench(rig: Rig, rate: float, hz: FloatArray, case: BenchVariant) -> Mo
 def impedance(rig: Rig, rate: float, gains: Gains, hz: FloatArray) -> OutputImpedance:
     """Return the impedance of the distal side against a clamped housing. hz: below half the rate."""
     moved = distal_responses(rig, rate, hz)
-    return OutputImpedance(hz, moved.impedance(law_of(rig, rate, gains)), moved.torque, moved.spring)
+    return OutputImpedance(hz, moved.impedance(laws.law_of(rig, rate, gains)), moved.torque, moved.spring)
 
 
 def _without_motor(rig: Rig, hz: FloatArray, s: ComplexArray) -> tuple[ComplexArray, ComplexArray]:

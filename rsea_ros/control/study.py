@@ -12,31 +12,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rsea_ros.control import robustness as robust, uncertainty
 from rsea_ros.control.controller import ControllerSettings, TorqueController, TorqueLimits
 from rsea_ros.control.following import Following, Step, closed_loop, fall, follow, step_response
 from rsea_ros.control.link import LinkShare
 from rsea_ros.control.margins import OutputImpedance, impedance
-from rsea_ros.control.robustness import (
-    Reach,
-    Robustness,
-    Softness,
-    Spread,
-    largest,
-    reach,
-    robustness,
-    softness,
-    spread,
-)
 from rsea_ros.control.synthesis import ControllerDesign, DesignLimits, design
-from rsea_ros.control.uncertainty import (
-    LOCKED,
-    BenchVariant,
-    Uncertainty,
-    load_range,
-    lock,
-    variant_rig,
-    with_ends,
-)
+from rsea_ros.control.uncertainty import LOCKED, BenchVariant, Uncertainty, load_range, variant_rig
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.propagator import state_space
 from rsea_ros.model.rig import EffectSetting, Rig, motor_torque
@@ -110,10 +92,10 @@ def trials(
     rig: Rig,
     loads: Mapping[str, Rig],
     design: ControllerDesign,
-    swept: Robustness,
+    swept: robust.Robustness,
     near: Following,
     far: Following,
-    apart: Spread,
+    apart: robust.Spread,
     stiffest: float,
 ) -> Iterator[TrialResult]:
     """Yield the trials of a clamped rig, its loads and the whole set.
@@ -166,7 +148,7 @@ def _sine_results(rig: Rig, loads: Mapping[str, Rig], design: ControllerDesign) 
                           worst=worst, allowed=5.0)  # fmt: skip
 
 
-def _bandwidth(near: Following, far: Following, apart: Spread) -> Iterator[TrialResult]:
+def _bandwidth(near: Following, far: Following, apart: robust.Spread) -> Iterator[TrialResult]:
     least, most = (near.gain_at(apart.hz) + edge for edge in apart.gain)
     yield TrialResult("torque bandwidth, -3 dB", near.bandwidth, "Hz", 19.1, True,
                 min(far.bandwidth, fall(apart.hz, least)))  # fmt: skip
@@ -212,13 +194,13 @@ def disturbed_rig(loads: Mapping[str, Rig], case: BenchVariant) -> Rig:
 
 def amplitude_of(load: Rig) -> float:
     """Return the sine, N m, that a load lets its motor make at 5 Hz, a fifth of it to spare."""
-    return min(AMPLITUDE, 0.8 * largest(load.with_effects(), HZ, motor_torque(load)[0], math.inf))
+    return min(AMPLITUDE, 0.8 * robust.largest(load.with_effects(), HZ, motor_torque(load)[0], math.inf))
 
 
 def tracking_error(rig: Rig, loads: Mapping[str, Rig], case: BenchVariant, design: ControllerDesign) -> float:
     """Return the error of the sine on a bench of the set, once it has been learned."""
     true, amplitude = disturbed_rig(loads, case), amplitude_of(variant_rig(loads[case.load], case))
-    return sine(true, lock(rig), design, amplitude, span=LEARNED, late=case.samples)
+    return sine(true, uncertainty.lock(rig), design, amplitude, span=LEARNED, late=case.samples)
 
 
 def compensations(rig: Rig, design: ControllerDesign) -> Iterator[Compensated]:
@@ -295,15 +277,15 @@ class AtRate:
     clamped bench and of the free one, and what the set makes of each and of the impedance."""
 
     design: ControllerDesign
-    swept: Robustness
+    swept: robust.Robustness
     trials: tuple[TrialResult, ...]
     compensations: tuple[Compensated, ...]
     locked: Following
     free: Following
-    locked_spread: Spread
-    free_spread: Spread
+    locked_spread: robust.Spread
+    free_spread: robust.Spread
     impedance: OutputImpedance
-    softness: Softness
+    softness: robust.Softness
 
 
 @dataclass(frozen=True)
@@ -318,7 +300,7 @@ class Study:
     free: Rig
     resonance: float
     rates: tuple[AtRate, ...]
-    reaches: Mapping[MotorLimits, tuple[tuple[Reach, Reach], ...]]
+    reaches: Mapping[MotorLimits, tuple[tuple[robust.Reach, robust.Reach], ...]]
 
 
 def study(
@@ -338,14 +320,18 @@ def study(
     if not rates:
         raise ParameterError("no rate, expected at least one, Hz")
     loads = load_range(rig, free)
-    clamped, light = loads[LOCKED], with_ends(rig, free)
+    clamped, light = loads[LOCKED], uncertainty.with_ends(rig, free)
     resonance = natural_frequency(clamped)
     done = []
     for k, rate in enumerate(rates):
         progress(f"{rate:g} Hz", k / len(rates))
         designed = design(rig, loads, rate, u=sets[k] if sets else None)
         done.append(_at_rate(clamped, light, loads, designed))
-    reaches = {motor: tuple(_reaches(clamped, light, a, motor) for a in AMPLITUDES) for motor in motors}
+    limits = {motor: (motor.torque, motor.speed) for motor in motors}
+    reaches = {
+        motor: tuple((robust.reach(clamped, a, *most), robust.reach(light, a, *most)) for a in AMPLITUDES)
+        for motor, most in limits.items()
+    }
     return Study(clamped, light, resonance, tuple(done), reaches)
 
 
@@ -356,12 +342,13 @@ def natural_frequency(rig: Rig) -> float:
 
 
 def _at_rate(clamped: Rig, light: Rig, loads: Mapping[str, Rig], designed: ControllerDesign) -> AtRate:
-    swept = robustness(clamped, loads, designed, steps=3)
+    swept = robust.robustness(clamped, loads, designed, steps=3)
     grid = np.geomspace(0.1, 0.45 * designed.rate, 300)
     near = follow(clamped, clamped, designed)
     u = designed.uncertainty
     far = follow(hard(loads, u), clamped, designed, late=u.samples)
-    apart, softest = spread(clamped, loads, designed, (LOCKED,)), softness(clamped, designed, grid)
+    apart = robust.spread(clamped, loads, designed, (LOCKED,))
+    softest = robust.softness(clamped, designed, grid)
     return AtRate(
         designed,
         swept,
@@ -370,12 +357,7 @@ def _at_rate(clamped: Rig, light: Rig, loads: Mapping[str, Rig], designed: Contr
         near,
         follow(light, clamped, designed),
         apart,
-        spread(clamped, loads, designed),
+        robust.spread(clamped, loads, designed),
         impedance(clamped, designed.rate, designed.gains, grid),
         softest,
     )
-
-
-def _reaches(clamped: Rig, light: Rig, amplitude: float, motor: MotorLimits) -> tuple[Reach, Reach]:
-    at, free = (reach(rig, amplitude, motor.torque, motor.speed) for rig in (clamped, light))
-    return at, free

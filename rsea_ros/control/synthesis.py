@@ -27,27 +27,9 @@ from types import MappingProxyType
 import numpy as np
 from scipy.optimize import minimize
 
+from rsea_ros.control import margins as loop, uncertainty
 from rsea_ros.control.law import FT, VELOCITY, Gains, law_of, sample_rig
-from rsea_ros.control.margins import (
-    Margins,
-    Moved,
-    actions,
-    distal_responses,
-    encirclements,
-    largest_pole,
-    margins,
-    returns,
-)
-from rsea_ros.control.uncertainty import (
-    LOCKED,
-    UNMEASURED,
-    Family,
-    Mode,
-    Uncertainty,
-    assumed,
-    corners,
-    family,
-)
+from rsea_ros.control.uncertainty import LOCKED, UNMEASURED, Family, Uncertainty, assumed, corners, family
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.rig import Rig, motor_torque
 from rsea_ros.records.record import ComplexArray, FloatArray
@@ -102,7 +84,7 @@ class ControllerDesign:
 
     gains: Gains
     rate: float
-    margins: Mapping[str, Margins]
+    margins: Mapping[str, loop.Margins]
     friction_left: float
     sensitivity: float = float("nan")
     impedance: float = float("nan")
@@ -120,7 +102,7 @@ class SynthesisProblem:
     rig: Rig
     rate: float
     family: Family
-    moved: Moved
+    moved: loop.Moved
     uncertainty: Uncertainty
 
 
@@ -177,7 +159,7 @@ def check(
     law, u = law_of(rig, rate, gains), u or assumed(rig, rate)
     for name, load in loads.items():
         for share in SHARES:
-            pole = largest_pole(law, sample_rig(load, rate), share)
+            pole = loop.largest_pole(law, sample_rig(load, rate), share)
             if pole > MARGINAL:
                 raise ParameterError(
                     f"rig {rig.name}: unstable at {rate:g} Hz with load {name!r}, {share:.0%} of the torque: "
@@ -203,7 +185,7 @@ def worst(designed: ControllerDesign) -> str:
     )
 
 
-def grid(rate: float, points: int = 150, mode: Mode | None = None) -> FloatArray:
+def grid(rate: float, points: int = 150, mode: uncertainty.Mode | None = None) -> FloatArray:
     """Return frequencies up to half the rate, Hz, those of the movement and of a mode among them."""
     highest = 0.4995 * rate
     parts = [
@@ -227,13 +209,13 @@ def _problem(
     rig: Rig, loads: Mapping[str, Rig], rate: float, hz: FloatArray, u: Uncertainty
 ) -> SynthesisProblem:
     benches = family(loads, corners(tuple(loads), u), rate, hz)
-    return SynthesisProblem(rig, rate, benches, distal_responses(rig, rate, grid(rate)), u)
+    return SynthesisProblem(rig, rate, benches, loop.distal_responses(rig, rate, grid(rate)), u)
 
 
 def _score(problem: SynthesisProblem, gains: Gains) -> RobustnessScore:
     law, f, moved = law_of(problem.rig, problem.rate, gains), problem.family, problem.moved
-    acted = actions(law, f.hz)
-    memory, whole = returns(law, f.plant, f.hz, f.path, f.current, acted)
+    acted = loop.actions(law, f.hz)
+    memory, whole = loop.returns(law, f.plant, f.hz, f.path, f.current, acted)
     sensitivity = (np.maximum(np.abs(memory), 1.0) / np.abs(whole)).max(axis=1)
     locked = np.array([case.load == LOCKED and case.samples == 0 for case in f.cases])
     slow = (f.hz >= HUNTED) & (f.hz < 0.25 * problem.rate)
@@ -243,7 +225,7 @@ def _score(problem: SynthesisProblem, gains: Gains) -> RobustnessScore:
     return RobustnessScore(
         sensitivity,
         friction_left(f.plant[FT] * memory / whole, f.hz),
-        encirclements(whole),
+        loop.encirclements(whole),
         np.abs(opposed / moved.spring),
         max(turned, float(speed.max()) - HUNTING),
         _noise(problem, acted, whole[0]),
@@ -269,9 +251,9 @@ def friction_left(response: FloatArray, hz: FloatArray) -> FloatArray:
 
 def _design(problem: SynthesisProblem, gains: Gains) -> ControllerDesign:
     law, f, score = law_of(problem.rig, problem.rate, gains), problem.family, _score(problem, gains)
-    memory, whole = returns(law, f.plant, f.hz, f.path, f.current)
+    memory, whole = loop.returns(law, f.plant, f.hz, f.path, f.current)
     by_load = {
-        case.load: margins(whole[k] / memory[k] - 1.0, f.hz, 1.0 / problem.rate)
+        case.load: loop.margins(whole[k] / memory[k] - 1.0, f.hz, 1.0 / problem.rate)
         for k, case in enumerate(f.cases)
         if case.nominal
     }

@@ -14,16 +14,7 @@ from typing import Protocol
 from rsea_ros.errors import DeviceError, ParameterError
 from rsea_ros.hardware.device import Device, NoReply, PortLost, Spring, State
 from rsea_ros.hardware.interlock import DeviceFault, event
-from rsea_ros.hardware.limits import (
-    UNRATED,
-    Guard,
-    Limits,
-    Rated,
-    Rating,
-    loosened,
-    unmeasured_quantities,
-    without,
-)
+from rsea_ros.hardware.limits import UNRATED, Guard, Limits, Rated, Rating, loosened, unmeasured_quantities
 from rsea_ros.hardware.protection import NONE, PROCESS
 from rsea_ros.hardware.witnesses import Witnesses
 from rsea_ros.records.record import is_measured
@@ -215,7 +206,7 @@ class GuardedDevice:
                 f" measures no {name}, expected 0 for none"
             )
         self.lifted = lacking
-        self.guard.limits = without(self._limits, lacking)
+        self.guard.limits = self._limits.without(lacking)
 
     def limit(self, names: Sequence[str]) -> None:
         """Take over what `derive` returns now for some quantities: lower ones from the next cycle on.
@@ -227,7 +218,7 @@ class GuardedDevice:
         told |= {name: derived.derived[name] for name in names if name in derived.derived}
         changed = {name: getattr(derived, name) for name in names if name not in self.lifted}
         limits = replace(self.guard.limits, **changed, derived=told)
-        checked = without(self._limits, self.lifted)
+        checked = self._limits.without(self.lifted)
         if name := loosened(limits, checked):
             most = "least" if name == "voltage" else "most"
             raise ParameterError(

@@ -81,6 +81,10 @@ class Limits:
             parts.append(f"{name}_limit {size}{source}")
         return ", ".join(parts)
 
+    def without(self, names: Sequence[str]) -> "Limits":
+        """Return limits that do not limit some quantities of NO_LIMIT."""
+        return Limits(**{**vars(self), **{name: NO_LIMIT[name] for name in names}})
+
 
 @dataclass(frozen=True)
 class Rating:
@@ -117,11 +121,6 @@ def unmeasured_quantities(limits: Limits, state: State) -> list[str]:
         name for name, none in NO_LIMIT.items()
         if getattr(limits, name) != none and not is_measured(getattr(state, name))
     ]  # fmt: skip
-
-
-def without(limits: Limits, names: Sequence[str]) -> Limits:
-    """Return limits that do not limit some quantities of NO_LIMIT."""
-    return Limits(**{**vars(limits), **{name: NO_LIMIT[name] for name in names}})
 
 
 def loosened(limits: Limits, before: Limits) -> str:

@@ -3,13 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from rsea_ros.control.controller import (
-    CORNER,
-    ControllerSettings,
-    Measurement,
-    TorqueController,
-    TorqueLimits,
-)
+from rsea_ros.control.controller import ControllerSettings, Measurement, TorqueController, TorqueLimits
 from rsea_ros.control.grid import Lateness, Tolerance
 from rsea_ros.control.law import Gains
 from rsea_ros.control.link import LinkShare
@@ -50,7 +44,8 @@ TABLE = live((
     ),
     NodeParameter("preview", False, "desired torques are stamped two samples ahead or more: no prediction"),
     NodeParameter(
-        "prediction", CORNER, "what a desired torque does faster is not predicted", "Hz", 1.0, 500.0
+        "prediction", ControllerSettings.corner, "what a desired torque does faster is not predicted", "Hz",
+        1.0, 500.0,
     ),
     NodeParameter(
         "torque_limit", DERIVED, "largest torque that is commanded; -1: as the driver derives it", "N m",

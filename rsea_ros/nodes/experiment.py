@@ -29,15 +29,9 @@ from rsea_ros.nodes._qos import COMMAND
 from rsea_ros.nodes._run import Component
 from rsea_ros.outputs.files import Destination, unused_path
 from rsea_ros.records.record import Record
+from rsea_ros.report import experiment as words
 from rsea_ros.report.diagnosis.page import write_diagnosis
 from rsea_ros.report.diagnosis.words import diagnosis_sentence
-from rsea_ros.report.experiment import (
-    check_session_free,
-    end_sentence,
-    known_causes,
-    shape_words,
-    write_campaign,
-)
 
 DEFAULT = "out/experiment"
 TABLE = (
@@ -70,7 +64,7 @@ class ExperimentNode:
     def __init__(self, node: Node, values: dict[str, Any]) -> None:
         self._node, self._values = node, values
         self._out = unused_path(Path(DEFAULT)) if values["out"] == DEFAULT else Path(values["out"])
-        check_session_free(self._out)
+        words.check_session_free(self._out)
         self._publisher = node.create_publisher(JointState, "torque_command", COMMAND)
         self._ears = BenchEars(node, values["axis"])
         self._bench = BenchStatus(node, values["joint"])
@@ -111,11 +105,10 @@ class ExperimentNode:
     def _hear(self, round_: Round) -> None:
         self._round = round_
         log = self._node.get_logger()
-        log.info(known_causes(round_.weighing))
-        assert round_.proposal is not None
-        log.info(
-            f"proposed: {shape_words(round_.proposal)}; {round_.proposal.resolved:.0%} expected to be decided"
-        )
+        log.info(words.known_causes(round_.weighing))
+        run = round_.proposal
+        assert run is not None
+        log.info(f"proposed: {words.shape_words(run)}; {run.resolved:.0%} expected to be decided")
 
     def _play(self, proposal: Proposal) -> Record | None:
         """In the loop's thread: request approval, play the run, return its record; None if declined."""
@@ -165,7 +158,7 @@ class ExperimentNode:
             if waits:
                 assert self._proposal is not None
                 self._answer = answer
-                outcome = f"{'plays' if answer else 'does not play'}: {shape_words(self._proposal)}"
+                outcome = f"{'plays' if answer else 'does not play'}: {words.shape_words(self._proposal)}"
                 self._changed.notify_all()
             response.success, response.message = waits, outcome if waits else "no run waits for an answer"
         return response
@@ -190,8 +183,8 @@ class ExperimentNode:
             return
         outcome = self._work.result()
         log = self._node.get_logger()
-        log.info(end_sentence(outcome))
-        report = write_campaign(outcome, self._campaign, self._out)
+        log.info(words.end_sentence(outcome))
+        report = words.write_campaign(outcome, self._campaign, self._out)
         self._health.publish()
         if outcome.seconds:
             log.info(f"diagnosis of all runs: {self._diagnose(outcome)}")
@@ -224,12 +217,12 @@ class ExperimentNode:
         if self._work.done() and not self._work.cancelled() and self._work.exception() is None:
             outcome = self._work.result()
             level = OK if outcome.end in ("confirmed", "nothing_wrong") else WARN
-            return NodeHealth(level, end_sentence(outcome), outcome.weighing.probability)
+            return NodeHealth(level, words.end_sentence(outcome), outcome.weighing.probability)
         waits = self._proposal is not None and self._answer is None
         state = "waits for ~/approve" if waits else "plays" if self._trial is not None else "designs"
         values: dict[str, object] = {"runs": self._runs}
         if self._proposal is not None:
-            values["run"] = shape_words(self._proposal)
+            values["run"] = words.shape_words(self._proposal)
         if self._round is not None:
             values |= {n: f"{p:.3f}" for n, p in self._round.weighing.probability.items()}
         return NodeHealth(OK, state, values)

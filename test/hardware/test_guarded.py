@@ -9,7 +9,7 @@ from rsea_ros.errors import DeviceError, ParameterError
 from rsea_ros.hardware.device import Refused, Spring
 from rsea_ros.hardware.guarded import GuardedDevice
 from rsea_ros.hardware.interlock import DeviceFault
-from rsea_ros.hardware.limits import Limits, without
+from rsea_ros.hardware.limits import Limits
 from rsea_ros.hardware.protection import BUS_WATCHDOG, NONE, PROCESS
 from test.hardware.logged_device import LOST, Device, cycles
 
@@ -86,7 +86,7 @@ def test_a_limit_of_what_is_not_measured_is_refused(device, name):
     with pytest.raises(ParameterError, match=f"{name}_limit = .* measures no {name}, expected 0 for none"):
         GuardedDevice(device, limits, 64.0).open()
     assert device.log == ["open", "read", "close"]
-    GuardedDevice(device, without(limits, [name]), 64.0).open()
+    GuardedDevice(device, limits.without([name]), 64.0).open()
     device.reading = every
     joint = GuardedDevice(device, limits, 64.0)
     joint.open()

@@ -15,7 +15,6 @@ from rsea_ros.hardware.limits import (
     check_limits,
     complaint,
     unmeasured_quantities,
-    without,
 )
 
 ALL = Limits(68.0, deflection=0.25, temperature=60.0, current=12.0, voltage=20.0, velocity=2.0, position=0.5,
@@ -117,7 +116,7 @@ def test_a_limited_quantity_that_a_reading_lacks_is_listed(limits, measured, lac
 @pytest.mark.parametrize("names", [["temperature"], ["current"], ["voltage"], ["current", "voltage"]])
 def test_a_limit_that_is_lifted_trips_nothing_and_the_others_stay(names):
     far = {"temperature": 1e9, "current": 1e9, "voltage": 0.0}
-    lifted = without(ALL, names)
+    lifted = ALL.without(names)
     assert complaint(lifted, reading(**(MEASURED | {name: far[name] for name in names}))) is None
     assert {name for name, limit in vars(ALL).items() if getattr(lifted, name) != limit} == set(names)
 

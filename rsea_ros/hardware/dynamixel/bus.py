@@ -4,14 +4,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
-from dynamixel_sdk import (
-    COMM_RX_CORRUPT,
-    COMM_RX_TIMEOUT,
-    COMM_SUCCESS,
-    COMM_TX_ERROR,
-    COMM_TX_FAIL,
-    Protocol2PacketHandler,
-)
+import dynamixel_sdk as sdk
 
 from rsea_ros.hardware.bus_motor import T, repeat
 from rsea_ros.hardware.device import NoReply, Refused
@@ -30,7 +23,7 @@ EMPTY = 11
 """Bytes of a status packet without parameters."""
 
 
-class PacketHandler(Protocol2PacketHandler):  # type: ignore[misc]  # the SDK has no types
+class PacketHandler(sdk.Protocol2PacketHandler):  # type: ignore[misc]  # the SDK has no types
     """Protocol 2.0 of the SDK with its wrong parts replaced; `receiver.rejected` counts damaged frames.
 
     txPacket of dynamixel-sdk 4.1.0 sends FF FF FD unstuffed, removeStuffing loses bytes, and rxPacket spins.
@@ -70,12 +63,12 @@ class PacketHandler(Protocol2PacketHandler):  # type: ignore[misc]  # the SDK ha
         """Stuff, sign and send a packet; earlier input is discarded. Raises PortLost."""
         data = frames.frame(txpacket[4], _payload(txpacket))
         if len(data) > frames.LONGEST:
-            return int(COMM_TX_ERROR)
+            return int(sdk.COMM_TX_ERROR)
         port.clearPort()
         self.receiver.reset()
         self._frames.clear()
         sent = port.writePort(data)
-        return int(COMM_SUCCESS if sent == len(data) else COMM_TX_FAIL)
+        return int(sdk.COMM_SUCCESS if sent == len(data) else sdk.COMM_TX_FAIL)
 
     def rxPacket(self, port: SerialPort, fast_option: bool) -> tuple[bytes, int]:
         """Wait for the next status packet until the port's time is over. Raises PortLost."""
@@ -87,14 +80,14 @@ class PacketHandler(Protocol2PacketHandler):  # type: ignore[misc]  # the SDK ha
             while self._frames:
                 packet = self._frames.pop(0)
                 if self._answers(packet):
-                    return packet, int(COMM_SUCCESS)
+                    return packet, int(sdk.COMM_SUCCESS)
                 self.stale += 1
                 self.acknowledged += len(packet) == EMPTY and not packet[8] & 0x7F
             data = port.receive()
             self._frames += self.receiver.feed(data, raw=fast_option)
             if not data and port.isPacketTimeout():
                 damaged = self.receiver.waiting or self.receiver.rejected.total() > rejected
-                return b"", int(COMM_RX_CORRUPT if damaged else COMM_RX_TIMEOUT)
+                return b"", int(sdk.COMM_RX_CORRUPT if damaged else sdk.COMM_RX_TIMEOUT)
 
     def _answers(self, packet: bytes) -> bool:
         parameters, refused = len(packet) - EMPTY, packet[8] & 0x7F
@@ -189,8 +182,8 @@ class Bus:
             yield
 
     def _check(self, request: str, result: int, error: int) -> None:
-        if result != COMM_SUCCESS:
-            kind = "corrupt" if result == COMM_RX_CORRUPT else "lost"
+        if result != sdk.COMM_SUCCESS:
+            kind = "corrupt" if result == sdk.COMM_RX_CORRUPT else "lost"
             self._failed[kind] += 1
             reply = "a damaged reply" if kind == "corrupt" else "no reply"
             raise NoReply(f"{self._name} on {self.port.port_name}: {reply} to {request}")

@@ -8,14 +8,9 @@ from dataclasses import asdict
 from rsea_ros.errors import DeviceError, ParameterError
 from rsea_ros.hardware.bus_motor import BusMotor, MotorSample, T, Unwrapper
 from rsea_ros.hardware.device import NoReply, PortLost
+from rsea_ros.hardware.dynamixel import control_tables
 from rsea_ros.hardware.dynamixel.bus import ALERT, Bus
-from rsea_ros.hardware.dynamixel.control_tables import (
-    TABLES,
-    ControlTable,
-    MotorConnection,
-    TorqueConstant,
-    error_names,
-)
+from rsea_ros.hardware.dynamixel.control_tables import ControlTable, MotorConnection, TorqueConstant
 from rsea_ros.hardware.dynamixel.frames import frame
 from rsea_ros.hardware.dynamixel.own_limits import OwnLimits, Watchlist, check_own_limits, own_limits
 from rsea_ros.hardware.dynamixel.port import SerialPort
@@ -162,7 +157,7 @@ class Motor(BusMotor):
     def sample(self, data: bytes, instant: int) -> MotorSample:
         """Return the reading with the motor's errors; watched registers are checked here in turn."""
         table = self.control_table
-        error = error_names(self.bus.get(table.hardware_error)) if self.bus.alert else ""
+        error = control_tables.error_names(self.bus.get(table.hardware_error)) if self.bus.alert else ""
         trouble, start = "" if error else self._watchlist.look(), table.sample[0]
         counts = self._counts.take(table.position.value(data, start))
         counts -= table.zero if self._settings.urdf_zero else 0
@@ -222,7 +217,7 @@ class Motor(BusMotor):
 
     def _complaint(self) -> str:
         error = self.bus.patiently(lambda: self.bus.get(self.control_table.hardware_error))
-        return error_names(error) if error else ""
+        return control_tables.error_names(error) if error else ""
 
     def _restart(self) -> None:
         self.bus.patiently(self.bus.reboot)
@@ -264,11 +259,11 @@ def stop_frames(table: ControlTable, identity: int) -> list[bytes]:
 def _table(model: int, settings: MotorConnection) -> ControlTable:
     """Return the control table of a model number. Raises DeviceError for one that is not expected."""
     where = f"motor ID {settings.identity} on {settings.path}"
-    if model not in TABLES:
-        raise DeviceError(f"{where}: model {model}, expected one of {', '.join(map(str, TABLES))}")
+    if model not in (known := control_tables.TABLES):
+        raise DeviceError(f"{where}: model {model}, expected one of {', '.join(map(str, known))}")
     if settings.model not in (0, model):
         raise DeviceError(f"{where}: model {model}, expected {settings.model} (parameter model)")
-    return TABLES[model]
+    return known[model]
 
 
 def _constant(table: ControlTable, settings: MotorConnection) -> TorqueConstant:
