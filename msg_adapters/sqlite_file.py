@@ -141,7 +141,7 @@ def _text(data: bytes | str) -> str:
 
 
 class SqliteStorage:
-    """One sqlite3 file being written (see writing.STORAGES)."""
+    """One sqlite3 file being written, as McapStorage is (see writing.STORAGES)."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -155,7 +155,6 @@ class SqliteStorage:
             self._database.executescript(Sqlite3Writer.SQLITE_SCHEMA)
 
     def add(self, topic: str, msgtype: str, offered: str = "[]") -> int:
-        """Declare a topic with the offered QoS as YAML; return its key."""
         text, digest = definition(msgtype)
         with _system_errors():
             if msgtype not in self._types:
@@ -166,11 +165,9 @@ class SqliteStorage:
             return int(self._database.execute(row, (topic, msgtype, offered, digest)).lastrowid or 0)
 
     def write(self, key: int, log_time: int, raw: bytes) -> None:
-        """Append a serialised message."""
         self._rows.append((key, log_time, raw))
 
     def write_all(self, keys: IntArray, log_times: IntArray, raws: Sequence[bytes]) -> None:
-        """Append serialised messages; keys, log_times: shape (n,)."""
         self._rows += zip(keys.tolist(), log_times.tolist(), raws, strict=True)
 
     def flush(self) -> None:
@@ -194,7 +191,6 @@ class SqliteStorage:
         self._database.close()
 
     def abort(self) -> None:
-        """Close the file; flushed data stay."""
         self._database.close()
 
 

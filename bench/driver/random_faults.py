@@ -19,7 +19,7 @@ from pathlib import Path
 
 from bench.driver.loop import RATE, Loop
 from rsea_ros.errors import DeviceError
-from rsea_ros.hardware.dynamixel.own_limits import LOOK, OVERDUE
+from rsea_ros.hardware.dynamixel.motor import LOOK, OVERDUE
 from rsea_ros.hardware.peer.remote import RemoteBench
 
 CALM = {

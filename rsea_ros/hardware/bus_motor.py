@@ -1,17 +1,15 @@
 """A motor on a bus: what each is asked at open, before its torque comes on, after a fault and at the end."""
 
-import math
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
 from typing import TypeVar
 
 from rsea_ros.errors import DeviceError
-from rsea_ros.hardware.device import NoReply, PortLost
+from rsea_ros.hardware.device import NoReply, PortLost, State
 from rsea_ros.hardware.limits import Limits, Rating
-from rsea_ros.hardware.protection import ANSWER, Protection, Supervised
+from rsea_ros.hardware.protection import ANSWER, BUS_WATCHDOG, Protection, Supervised
 
 T = TypeVar("T")
 ATTEMPTS = 5
@@ -46,25 +44,6 @@ class Unwrapper:
         return self._last
 
 
-@dataclass(frozen=True)
-class MotorSample:
-    """instant: middle of the transaction, monotonic ns. position rad, without a wrap, velocity rad/s, torque
-    N m, current A, voltage V, temperature °C; nan: not measured.
-
-    hardware_error: errors that the motor reports. trouble: wrong values of its registers, in words.
-    """
-
-    instant: int
-    position: float
-    velocity: float
-    torque: float
-    current: float = math.nan
-    voltage: float = math.nan
-    temperature: float = math.nan
-    hardware_error: str = ""
-    trouble: str = ""
-
-
 class BusMotor(ABC):
     """One motor of some protocol. name: in messages, with its ID and port.
 
@@ -75,14 +54,19 @@ class BusMotor(ABC):
 
     acknowledged_late = False
 
-    def __init__(self, name: str, watchdog: float, supervisor: str) -> None:
-        self.name = name
+    def __init__(self, name: str, watchdog: float, supervisor: str, wraps: int = 1 << 32) -> None:
+        """watchdog, supervisor: as of MotorConnection. wraps: counts after which the angle begins anew."""
+        self.name, self._counts = name, Unwrapper(wraps)
         self.protection: Protection | Supervised = Supervised(watchdog, supervisor)
         self._known: Mapping[str, object] | None = None
         self._owes_zero = False
 
     def open(self) -> None:
-        """Open the port, check who answers, switch the torque off, set torque mode, read the limits."""
+        """Open the port, check who answers, switch the torque off, set torque mode, read the limits.
+
+        Its position counts anew.
+        """
+        self._counts.restart()
         self._known = None
         self._set_up()
         self._owes_zero = False
@@ -171,6 +155,11 @@ class BusMotor(ABC):
         """What the motor can do at most."""
 
     @property
+    def _watched(self) -> bool:
+        """Whether the motor has a watchdog of its own."""
+        return self.protection.kind == BUS_WATCHDOG
+
+    @property
     def torque_limit(self) -> float:
         """The motor's own, N m."""
         return self.rating.torque
@@ -180,8 +169,11 @@ class BusMotor(ABC):
         """Compare the driver's limits with the motor's own. Raises ParameterError."""
 
     @abstractmethod
-    def read(self, meanwhile: Callable[[], None] | None = None) -> MotorSample:
-        """Read all measurements once. Raises NoReply, PortLost. meanwhile: done while the reply is coming."""
+    def read(self, meanwhile: Callable[[], None] | None = None) -> State:
+        """Read all measurements once. Raises NoReply, PortLost. meanwhile: done while the reply is coming.
+
+        stamp: of the middle of the transaction, monotonic, ns. position: without a wrap.
+        """
 
     @abstractmethod
     def write(self, torque: float) -> None:

@@ -47,7 +47,6 @@ class MotorNetft:
 
     @property
     def protection(self) -> Protection:
-        """The motor's."""
         return self._motor.protection
 
     @property
@@ -75,7 +74,6 @@ class MotorNetft:
             raise
 
     def enable(self) -> None:
-        """Switch the torque on, at zero."""
         self._motor.enable()
 
     def read(self) -> State:
@@ -90,20 +88,14 @@ class MotorNetft:
             self._take_wrenches()
         wrenches, trouble, self._waiting, self._trouble = self._waiting, self._trouble, [], ""
         stamp, wrench = wrenches[-1] if wrenches else (0, None)
-        self._last = State(
-            stamp=sample.instant + self._epoch,
+        self._last = replace(
+            sample,
+            stamp=sample.stamp + self._epoch,
             position=sample.position - self.origin,
-            velocity=sample.velocity,
-            motor_torque=sample.torque,
             ft_stamp=stamp,
             wrench=wrench,
             wrenches=wrenches,
-            current=sample.current,
-            voltage=sample.voltage,
-            temperature=sample.temperature,
-            hardware_error=sample.hardware_error,
             ft_trouble=trouble,
-            motor_trouble=sample.trouble,
             deflection=deflection,
             acknowledged_late=self._motor.acknowledged_late,
         )
@@ -118,15 +110,12 @@ class MotorNetft:
         self._trouble = self._trouble or trouble
 
     def write(self, torque: float) -> None:
-        """Command a torque (N m)."""
         self._motor.write(torque)
 
     def disable(self) -> None:
-        """Command zero torque and switch it off."""
         self._motor.disable()
 
     def zero_ft(self) -> None:
-        """Tare the sensor."""
         if self._sensor is not None:
             self._sensor.zero()
 
@@ -162,7 +151,6 @@ class MotorNetft:
         return values
 
     def close(self) -> None:
-        """Zero torque, off, everything closed."""
         try:
             self._motor.close()
         finally:

@@ -219,7 +219,7 @@ def test_a_reply_during_the_reading_is_a_late_acknowledgement(during_write, duri
     with suppress(NoReply):
         motor.write(1.0)
     begun = time.monotonic_ns()
-    assert motor.read().instant >= begun and motor.acknowledged_late is late
+    assert motor.read().stamp >= begun and motor.acknowledged_late is late
     counted = {"lost": not during_write, "stale": during_read.count(WRITTEN)}
     assert motor.bus.errors == Counter(counted)
     motor.write(1.0)

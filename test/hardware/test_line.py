@@ -246,7 +246,7 @@ def encoder(*counts, **settings):
 
 
 def sample(position=0.0, velocity=0.0, instant=0):
-    return SimpleNamespace(position=position, velocity=velocity, instant=instant)
+    return SimpleNamespace(position=position, velocity=velocity, stamp=instant)
 
 
 def test_it_counts_from_where_it_is_opened_unless_its_own_zero_counts():

@@ -13,8 +13,7 @@ from robstride.client import Client, MotorMode, MotorMsg
 from robstride_dynamics import Motor, RobstrideBus
 
 from rsea_ros.errors import ParameterError
-from rsea_ros.hardware.mit_can.frames import Frame, count, frames_of, value
-from rsea_ros.hardware.mit_can.tables import RANGES, _families, drive_table
+from rsea_ros.hardware.mit_can.frames import RANGES, Frame, _families, count, drive_table, frames_of, value
 
 MODELS = {family: list(content["models"]) for family, content in _families().items()}
 STANDARD = MODELS["damiao"] + MODELS["cubemars"] + MODELS["mini_cheetah"]

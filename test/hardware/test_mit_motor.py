@@ -132,7 +132,7 @@ def test_the_torque_that_is_commanded_alone_acts_and_is_read_back(virtual, model
     motor, plant = bus.motor(model), bus.plants[0]
     motor.open()
     plant.position = 0.7
-    assert motor.read().torque == pytest.approx(0.0, abs=0.05) and plant.torque == 0.0
+    assert motor.read().motor_torque == pytest.approx(0.0, abs=0.05) and plant.torque == 0.0
     motor.write(5.0)
     assert motor.read().position == pytest.approx(1.0, abs=1e-3), "its zero is at -0.3 rad"
     assert plant.torque == 0.0, "it is off: what is sent is what switches it off"
@@ -142,7 +142,7 @@ def test_the_torque_that_is_commanded_alone_acts_and_is_read_back(virtual, model
         motor.write(torque)
         motor.read()
         motor.write(torque)
-        assert motor.read().torque == pytest.approx(torque, abs=0.04)
+        assert motor.read().motor_torque == pytest.approx(torque, abs=0.04)
         assert plant.torque == pytest.approx(torque, abs=0.02)
     motor.write(5.0)
     motor.close()
@@ -188,7 +188,7 @@ def test_what_a_drive_keeps_from_before_is_zero_when_it_is_switched_on(opened):
     felt, told = [], plant.write
     plant.write = lambda torque: (felt.append(torque), told(torque))
     motor.enable()
-    assert motor.read().trouble == ""
+    assert motor.read().motor_trouble == ""
     assert felt and max(map(abs, felt)) < 0.02
 
 
@@ -201,7 +201,7 @@ def test_two_drives_of_one_id_are_refused_and_noticed(virtual, opened):
 
     def noticed():
         motor.write(1.0)
-        return "two drives" in motor.read().trouble and motor.health()["bus_twice"] >= 3
+        return "two drives" in motor.read().motor_trouble and motor.health()["bus_twice"] >= 3
 
     until(noticed)
     del bus.drives[0]
@@ -220,7 +220,7 @@ def test_several_drives_share_a_bus_and_do_not_hear_each_other(virtual):
         motor.write(1.0 + place)
     samples = [motor.read() for motor in motors]
     assert [s.position for s in samples] == pytest.approx([0.3, 0.4, 0.5], abs=1e-3)
-    assert [s.trouble for s in samples] == [""] * 3
+    assert [s.motor_trouble for s in samples] == [""] * 3
     assert [plant.torque for plant in bus.plants] == pytest.approx([1.0, 2.0, 3.0], abs=0.02)
 
 
@@ -238,9 +238,9 @@ def test_the_angle_goes_on_where_its_counts_begin_anew(opened, model):
 @pytest.mark.parametrize("angle", (12.4, -13.0))
 def test_the_end_of_an_angle_of_which_no_source_says_what_follows_is_a_fault(opened, angle):
     _, motor, plant = opened("DM8009")
-    assert motor.read().trouble == ""
+    assert motor.read().motor_trouble == ""
     plant.position = angle
-    assert motor.read().trouble == "the angle is at the end of its range, ±12.5 rad"
+    assert motor.read().motor_trouble == "the angle is at the end of its range, ±12.5 rad"
 
 
 def test_a_controller_that_is_bus_off_is_a_lost_port(opened):

@@ -16,8 +16,17 @@ from scipy import constants
 from rsea_ros.errors import DeviceError
 from rsea_ros.hardware.netft import calibration
 from rsea_ros.hardware.netft.calibration import parse
-from rsea_ros.hardware.netft.rdt import RESYNCHRONISE, RdtRecord, Sequence, decode, request, trouble
-from rsea_ros.hardware.netft.receiver import HELD, Arrival, DatagramReceiver
+from rsea_ros.hardware.netft.receiver import (
+    HELD,
+    RESYNCHRONISE,
+    Arrival,
+    DatagramReceiver,
+    RdtRecord,
+    Sequence,
+    decode,
+    request,
+    trouble,
+)
 from rsea_ros.hardware.netft.sensor import Stillness
 from test.nodes.stalls import until
 

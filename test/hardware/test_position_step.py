@@ -9,13 +9,12 @@ import pytest
 from rsea_ros.errors import DeviceError
 from rsea_ros.hardware.device import State
 from rsea_ros.hardware.dynamixel.control_tables import TABLES, MotorConnection, TorqueConstant
-from rsea_ros.hardware.dynamixel.motor import Motor
-from rsea_ros.hardware.dynamixel.own_limits import OwnLimits
+from rsea_ros.hardware.dynamixel.motor import Motor, OwnLimits
 from rsea_ros.hardware.guarded import GuardedDevice
 from rsea_ros.hardware.interlock import DeviceFault
 from rsea_ros.hardware.limits import Limits, Rating
+from rsea_ros.hardware.mit_can.frames import _families
 from rsea_ros.hardware.mit_can.motor import CanConnection, MitMotor
-from rsea_ros.hardware.mit_can.tables import _families
 from rsea_ros.hardware.simulated import SimulatedDevice
 from rsea_ros.model.rig import Sensor
 from rsea_ros.model.rig_file import load_rig

@@ -9,7 +9,7 @@ import pytest
 from rsea_ros.errors import DeviceError
 from rsea_ros.hardware.bus_motor import Unwrapper
 from rsea_ros.hardware.device import NoReply
-from rsea_ros.hardware.dynamixel.own_limits import Watchlist
+from rsea_ros.hardware.dynamixel.motor import Watchlist
 from rsea_ros.hardware.interlock import DeviceFault
 from rsea_ros.hardware.limits import Limits
 from test.hardware.conftest import Loop, well_behaved

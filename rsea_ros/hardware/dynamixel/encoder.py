@@ -5,8 +5,8 @@ import time
 from collections import Counter
 from dataclasses import dataclass
 
-from rsea_ros.hardware.bus_motor import MotorSample, Unwrapper
-from rsea_ros.hardware.device import NoReply
+from rsea_ros.hardware.bus_motor import Unwrapper
+from rsea_ros.hardware.device import NoReply, State
 from rsea_ros.hardware.dynamixel.bus import Bus
 from rsea_ros.hardware.dynamixel.port import SerialPort
 
@@ -43,14 +43,14 @@ class BusEncoder:
         """Failed transactions by kind."""
         return self._bus.errors
 
-    def open(self, sample: MotorSample, *, absolute: bool) -> None:
-        """Check that it answers. sample: of now. absolute: its zero counts. Raises NoReply, Refused."""
+    def open(self, sample: State, *, absolute: bool) -> None:
+        """Check that it answers. sample: the motor's. absolute: its zero counts. Raises NoReply, Refused."""
         self._zero = 0.0
         self._counts.restart()
         zero = self._bus.patiently(lambda: self.deflection(sample))
         self._zero = 0.0 if absolute else zero
 
-    def deflection(self, sample: MotorSample) -> float:
+    def deflection(self, sample: State) -> float:
         """Return the deflection (rad) just after a sample of the motor. Raises NoReply, Refused, PortLost.
 
         After a failure the next read is longer or shorter by a byte, as that of the motor. An angle of the
@@ -67,5 +67,5 @@ class BusEncoder:
         angle = counts * 2.0 * math.pi / self._settings.pulses
         if self._settings.place == SPRING:
             return angle - self._zero
-        output = sample.position + 1e-9 * (instant - sample.instant) * sample.velocity
+        output = sample.position + 1e-9 * (instant - sample.stamp) * sample.velocity
         return output - angle - self._zero

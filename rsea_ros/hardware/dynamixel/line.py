@@ -10,8 +10,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from rsea_ros.errors import DeviceError
-from rsea_ros.hardware.bus_motor import MotorSample
-from rsea_ros.hardware.device import NoReply, PortLost
+from rsea_ros.hardware.device import NoReply, PortLost, State
 from rsea_ros.hardware.dynamixel.bus import ALERT
 from rsea_ros.hardware.dynamixel.control_tables import ControlTable, MotorConnection
 from rsea_ros.hardware.dynamixel.frames import BROADCAST, StatusFrameParser, frame
@@ -197,7 +196,7 @@ class LineMotor(Motor):
         super()._set_up()
         self._line.admit(self._id, self.control_table, self.bus.return_delay)
 
-    def read(self, meanwhile: Callable[[], None] | None = None) -> MotorSample:
+    def read(self, meanwhile: Callable[[], None] | None = None) -> State:
         """Return the reading of the exchange, or a separate one. Raises NoReply, PortLost, Refused."""
         if not self._line.has_read(self._id):
             return super().read(meanwhile)

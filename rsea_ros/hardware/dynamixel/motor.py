@@ -1,21 +1,128 @@
-"""A Dynamixel in torque (current) mode: one read and one write a cycle, in SI units."""
+"""A Dynamixel in torque (current) mode, in SI units: one read and one write a cycle, and its own limits."""
 
 import math
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 
 from rsea_ros.errors import DeviceError, ParameterError
-from rsea_ros.hardware.bus_motor import BusMotor, MotorSample, T, Unwrapper
-from rsea_ros.hardware.device import NoReply, PortLost
+from rsea_ros.hardware.bus_motor import BusMotor, T
+from rsea_ros.hardware.device import NoReply, PortLost, State
 from rsea_ros.hardware.dynamixel import control_tables
 from rsea_ros.hardware.dynamixel.bus import ALERT, Bus
-from rsea_ros.hardware.dynamixel.control_tables import ControlTable, MotorConnection, TorqueConstant
+from rsea_ros.hardware.dynamixel.control_tables import ControlTable, Item, MotorConnection, TorqueConstant
 from rsea_ros.hardware.dynamixel.frames import frame
-from rsea_ros.hardware.dynamixel.own_limits import OwnLimits, Watchlist, check_own_limits, own_limits
 from rsea_ros.hardware.dynamixel.port import SerialPort
 from rsea_ros.hardware.limits import Limits, Rating
 from rsea_ros.hardware.protection import BUS_WATCHDOG, Protection, Supervised
+
+REVERSED, ENABLED_BY_GOAL = 0x01, 0x08
+"""Bits of the drive mode: the direction is turned round; a goal that is written switches the torque on."""
+ENABLED_AT_START = 0x01
+"""Bit of the startup configuration: the torque is on when the power comes."""
+READ = (
+    "firmware", "return_delay", "drive_mode", "operating_mode", "homing_offset", "temperature_limit",
+    "max_voltage", "min_voltage", "torque_limit", "startup",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class OwnLimits:
+    """current A, temperature °C, voltages V, homing_offset rad. reversed: whether positive is clockwise."""
+
+    firmware: int
+    return_delay: int
+    operating_mode: int
+    current: float
+    temperature: float
+    lowest_voltage: float
+    highest_voltage: float
+    homing_offset: float
+    reversed: bool
+
+
+def own_limits(bus: Bus, table: ControlTable) -> OwnLimits:
+    """Read the settings of the motor.
+
+    Raises DeviceError, also for a motor whose torque is not switched by torque_enable alone.
+    """
+    start, size = table.span(READ)
+    data = bus.patiently(lambda: bus.read(start, size))
+    value = {name: table.items[name].value(data, start) for name in READ if name in table.items}
+    for name, bit, reason in (
+        ("drive_mode", ENABLED_BY_GOAL, "a goal that is written switches its torque on"),
+        ("startup", ENABLED_AT_START, "its torque is on when the power comes"),
+    ):
+        if value.get(name, 0) & bit:
+            without = value[name] & ~bit
+            raise DeviceError(f"motor: {name} {value[name]}: {reason}, expected {without}, set in the motor")
+    return OwnLimits(
+        firmware=value["firmware"],
+        return_delay=value["return_delay"],
+        operating_mode=value["operating_mode"],
+        current=value["torque_limit"] * table.ampere,
+        temperature=float(value["temperature_limit"]),
+        lowest_voltage=0.1 * value["min_voltage"],
+        highest_voltage=0.1 * value["max_voltage"],
+        homing_offset=value["homing_offset"] * 2.0 * math.pi / table.pulses,
+        reversed=bool(value.get("drive_mode", 0) & REVERSED),
+    )
+
+
+def check_own_limits(limits: Limits, motor_limits: OwnLimits, name: str) -> None:
+    """Compare the driver's limits with the motor's. Raises ParameterError that names all that do not fit."""
+    wrong = []
+    if limits.temperature > motor_limits.temperature:
+        wrong.append(
+            f"temperature_limit = {limits.temperature:g} °C, expected at most"
+            f" {motor_limits.temperature:g} °C, where the motor switches itself off"
+        )
+    if "voltage" not in limits.derived and limits.voltage >= motor_limits.highest_voltage:
+        wrong.append(
+            f"voltage_limit = {limits.voltage:g} V, expected less than"
+            f" {motor_limits.highest_voltage:.4g} V, the most that the motor takes"
+            f" (it takes {motor_limits.lowest_voltage:.4g} V or more)"
+        )
+    if wrong:
+        raise ParameterError(f"parameter {'; '.join(wrong)} ({name})")
+
+
+LOOK, OVERDUE = 0.25, 0.2
+"""s from one register to the next, three under torque; for which one may not answer. So a fault is latched
+within a second, however long a cycle takes."""
+
+
+class Watchlist:
+    """Registers of one motor and the values that they shall have."""
+
+    def __init__(self, bus: Bus) -> None:
+        self._bus = bus
+        self.expect()
+
+    def expect(self, *registers: tuple[str, Item, int], every: float = LOOK) -> None:
+        """Set the expected registers from now on: name, item, value; empty: nothing is checked.
+
+        every: s, one of them in turn.
+        """
+        self._expected, self._every = list(registers), every
+        self._due, self._asked = time.monotonic(), math.inf
+
+    def look(self) -> str:
+        """Read the register that is due, again in the next cycle if its reply is lost; return its fault."""
+        now = time.monotonic()
+        if not self._expected or now < self._due:
+            return ""
+        name, item, expected = self._expected[0]
+        self._asked = min(self._asked, now)
+        try:
+            value = self._bus.get(item)
+        except NoReply:
+            late = now - self._asked
+            return f"{name} could not be read for {late:.2g} s" if late > OVERDUE else ""
+        self._due, self._asked = max(self._due + self._every, self._asked), math.inf
+        self._expected.append(self._expected.pop(0))
+        return "" if value == expected else f"{name} is {value}, expected {expected}"
+
 
 TORQUE_MODE, ACKNOWLEDGE_ALL = 0, 2
 RETURN_DELAY_UNIT = 2e-6
@@ -40,7 +147,7 @@ class Motor(BusMotor):
         self.bus = Bus(self.port, settings.identity)
         self._watchlist = Watchlist(self.bus)
         self._longer, self._spared = 0, 0.0
-        self._unanswered, self._counts = -1, Unwrapper()
+        self._unanswered = -1
         self.table: ControlTable | None = None
         self.limits: OwnLimits | None = None
         self.torque_constant = TorqueConstant(math.nan, math.nan, math.nan, "")
@@ -63,14 +170,8 @@ class Motor(BusMotor):
         return Rating(torque, speed, math.inf, own.current, *supply, count)
 
     def check(self, limits: Limits) -> None:
-        """Compare the driver's limits with the motor's. Raises ParameterError."""
         assert self.limits is not None
         check_own_limits(limits, self.limits, self.control_table.name)
-
-    def open(self) -> None:
-        """Open it; its position counts anew."""
-        self._counts.restart()
-        super().open()
 
     def _set_up(self) -> None:
         if not self._shared:
@@ -85,10 +186,7 @@ class Motor(BusMotor):
         self._supervise()
 
     def _identify(self) -> None:
-        """Switch the torque off, compare motor and settings with those of `open`, set torque mode.
-
-        Raises DeviceError for another motor, or one with other settings: they are checked at `open`.
-        """
+        """See BusMotor. Raises DeviceError for another motor, or one with other settings."""
         table, found = self.control_table, {"model": self._model()}
         self._stop()
         self.limits = own_limits(self.bus, table)
@@ -113,11 +211,6 @@ class Motor(BusMotor):
             return self.protection
         return Supervised(self._settings.watchdog, self._settings.supervisor)
 
-    @property
-    def _watched(self) -> bool:
-        """Whether the motor has a watchdog of its own."""
-        return not isinstance(self.protection, Supervised)
-
     def _switch_on(self) -> None:
         table = self.control_table
         self._identify()
@@ -130,10 +223,8 @@ class Motor(BusMotor):
         self.bus.set(table.torque_enable, 1)
         self._watchlist.expect(*kept)
 
-    def read(self, meanwhile: Callable[[], None] | None = None) -> MotorSample:
-        """Read all measurements once. Raises NoReply, PortLost, Refused.
-
-        meanwhile: done while the reply is on its way.
+    def read(self, meanwhile: Callable[[], None] | None = None) -> State:
+        """Read all measurements once, see BusMotor. Raises Refused, too.
 
         After a failure the next read is longer or shorter by a byte: a reply that comes late has the wrong
         size and cannot be mistaken for the new one.
@@ -154,7 +245,7 @@ class Motor(BusMotor):
         instant = (begin + time.monotonic_ns()) // 2
         return self.sample(data, instant)
 
-    def sample(self, data: bytes, instant: int) -> MotorSample:
+    def sample(self, data: bytes, instant: int) -> State:
         """Return the reading with the motor's errors; watched registers are checked here in turn."""
         table = self.control_table
         error = control_tables.error_names(self.bus.get(table.hardware_error)) if self.bus.alert else ""
@@ -162,20 +253,19 @@ class Motor(BusMotor):
         counts = self._counts.take(table.position.value(data, start))
         counts -= table.zero if self._settings.urdf_zero else 0
         current = table.current.value(data, start) * table.ampere
-        return MotorSample(
-            instant=instant,
+        return State(
+            stamp=instant,
             position=counts * table.count,
             velocity=table.velocity.value(data, start) * table.radian_per_second,
-            torque=self.torque_of(current),
+            motor_torque=self.torque_of(current),
             current=current,
             voltage=table.voltage.value(data, start) * 0.1,
             temperature=float(table.temperature.value(data, start)),
             hardware_error=error,
-            trouble=trouble,
+            motor_trouble=trouble,
         )
 
     def write(self, torque: float) -> None:
-        """Command a torque (N m). Raises NoReply, PortLost, Refused."""
         try:
             self.bus.put(self.control_table.goal_torque, self.counts(torque))
         except NoReply:
@@ -192,11 +282,9 @@ class Motor(BusMotor):
         return current * self.torque_constant.value
 
     def patiently(self, transaction: Callable[[], T]) -> T:
-        """Return the result of a transaction outside the cycle, with several attempts and more time."""
         return self.bus.patiently(transaction)
 
     def health(self) -> Mapping[str, object]:
-        """Return errors of the bus by kind, and the motor's settings."""
         values: dict[str, object] = {f"bus_{kind}": n for kind, n in self.bus.errors.items()}
         if self.table is not None and self.limits is not None:
             values |= {
@@ -241,7 +329,6 @@ class Motor(BusMotor):
         self._watchlist.expect(("torque_enable", table.torque_enable, 0), every=WHILE_OFF)
 
     def _supervise(self) -> None:
-        """Start a supervisor for a motor without a watchdog, and a new one for one that is dead."""
         if isinstance(self.protection, Supervised):
             identity = self._settings.identity
             replies = [frame(identity, bytes([STATUS, error])) for error in (0, ALERT)]

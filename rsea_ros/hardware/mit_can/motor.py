@@ -11,12 +11,11 @@ from dataclasses import dataclass
 from itertools import cycle
 
 from rsea_ros.errors import DeviceError, ParameterError
-from rsea_ros.hardware.bus_motor import ATTEMPTS, BusMotor, MotorSample, T, Unwrapper, repeat
-from rsea_ros.hardware.device import NoReply
+from rsea_ros.hardware.bus_motor import ATTEMPTS, BusMotor, T, repeat
+from rsea_ros.hardware.device import NoReply, State
 from rsea_ros.hardware.limits import Limits, Rating
-from rsea_ros.hardware.mit_can.frames import Feedback, Frame, frames_of, value
+from rsea_ros.hardware.mit_can.frames import RANGES, Feedback, Frame, drive_table, frames_of, value
 from rsea_ros.hardware.mit_can.port import CanPort
-from rsea_ros.hardware.mit_can.tables import RANGES, drive_table
 from rsea_ros.hardware.protection import BUS_WATCHDOG, NONE, Protection, Supervised
 
 PATIENCE = 0.02
@@ -48,9 +47,9 @@ class MitMotor(BusMotor):
     """One drive. Raises ParameterError for a model or an ID that does not exist."""
 
     def __init__(self, settings: CanConnection) -> None:
-        name = f"drive ID {settings.identity} on {settings.channel}"
-        super().__init__(name, settings.watchdog, settings.supervisor)
         self._settings, self.table = settings, drive_table(settings.model)
+        name, wraps = f"drive ID {settings.identity} on {settings.channel}", self.table.wraps or 1 << 32
+        super().__init__(name, settings.watchdog, settings.supervisor, wraps)
         least, most = self.table.ids
         if not least <= settings.identity <= most:
             raise ParameterError(f"parameter id = {settings.identity}, expected {least} to {most}")
@@ -59,7 +58,6 @@ class MitMotor(BusMotor):
         self._latency = settings.latency
         self._open = self._on = self._asked = False
         self._sent = self._heard = self._owed = self._twins = 0
-        self._counts = Unwrapper(self.table.wraps or 1 << 32)
         self._registers: dict[str, float] = {}
         self._marks = cycle(self.table.registers)
 
@@ -83,11 +81,6 @@ class MitMotor(BusMotor):
                     f" ({self.table.name})"
                 )
 
-    def open(self) -> None:
-        """Open it; its position counts anew."""
-        self._counts.restart()
-        super().open()
-
     def _switch_on(self) -> None:
         self._identify()
         if self._watched:
@@ -101,7 +94,7 @@ class MitMotor(BusMotor):
             raise DeviceError(f"torque of {torque} N·m, expected a finite value")
         self._request(self._frames.command(torque) if self._on else self._frames.disable())
 
-    def read(self, meanwhile: Callable[[], None] | None = None) -> MotorSample:
+    def read(self, meanwhile: Callable[[], None] | None = None) -> State:
         """Return the answer to the last command, or to a request of its own. Raises NoReply, PortLost."""
         if not self._asked:
             self.write(0.0)
@@ -112,14 +105,14 @@ class MitMotor(BusMotor):
         table, counts = self.table, feedback.counts
         if table.wraps:
             counts = self._counts.take(counts)
-        return MotorSample(
-            instant=(self._sent + self._heard) // 2,
+        return State(
+            stamp=(self._sent + self._heard) // 2,
             position=value(counts, table.position, 16),
             velocity=feedback.velocity,
-            torque=feedback.torque,
+            motor_torque=feedback.torque,
             temperature=feedback.temperature,
             hardware_error=feedback.error,
-            trouble="" if feedback.error else self._trouble(feedback),
+            motor_trouble="" if feedback.error else self._trouble(feedback),
         )
 
     def _trouble(self, feedback: Feedback) -> str:
@@ -133,7 +126,6 @@ class MitMotor(BusMotor):
         return ""
 
     def patiently(self, transaction: Callable[[], T]) -> T:
-        """Return the result of a transaction outside the cycle, with several attempts and more time."""
         usual, self._latency = self._latency, max(self._latency, PATIENCE)
         try:
             return repeat(transaction)
@@ -141,7 +133,6 @@ class MitMotor(BusMotor):
             self._latency = usual
 
     def health(self) -> Mapping[str, object]:
-        """Return errors of the bus by kind, and the settings of the drive."""
         values: dict[str, object] = {f"bus_{kind}": n for kind, n in self.port.errors.items()}
         settings = {f"drive_{name}": f"{number:g}" for name, number in self._registers.items()}
         return values | settings | {
@@ -161,21 +152,13 @@ class MitMotor(BusMotor):
             self.protection = Supervised(self._settings.watchdog, self._settings.supervisor)
         self._supervise()
 
-    @property
-    def _watched(self) -> bool:
-        """Whether the drive has a watchdog of its own."""
-        return self.protection.kind == BUS_WATCHDOG
-
     def _identify(self) -> None:
-        """Switch the torque off, compare drive and settings with those of `open`, set the mode of MIT frames.
-
-        Raises DeviceError for another drive, another one of its ID, and ranges that are not the table's.
-        """
+        """See BusMotor. Raises DeviceError for another drive, one of its ID too, and for other ranges."""
         self._stop()
         for _ in range(TWINS + 1):
             state = self.patiently(self.read)
         if self._twins >= TWINS:
-            raise DeviceError(f"{self.name}: {state.trouble or 'more answers than commands'}")
+            raise DeviceError(f"{self.name}: {state.motor_trouble or 'more answers than commands'}")
         found: dict[str, object] = {"model": self.table.name}
         if (frame := self._frames.identify()) is not None:
             found["number"] = self._ask(frame, self._frames.unique)

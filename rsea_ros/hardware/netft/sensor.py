@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from rsea_ros.errors import DeviceError
 from rsea_ros.hardware.device import Wrench
 from rsea_ros.hardware.netft.calibration import Calibration, fetch
-from rsea_ros.hardware.netft.rdt import SET_BIAS, trouble
-from rsea_ros.hardware.netft.receiver import Arrival, DatagramReceiver
+from rsea_ros.hardware.netft.receiver import SET_BIAS, Arrival, DatagramReceiver, trouble
 
 LEAST, TIMES = 50_000_000, 10
 """ns of equal records that are no chance; multiple of the longest such time at rest that they exceed."""
