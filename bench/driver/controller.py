@@ -34,8 +34,8 @@ from msg_adapters.topic_map import AXES, JOINT_STATE, WRENCH
 from rsea_ros.hardware.dynamixel.control_tables import TABLES
 from rsea_ros.hardware.peer.remote import RemoteBench
 from rsea_ros.nodes._cycle import SECOND
-from rsea_ros.nodes._mailbox import Mailbox, MessageFields, Polled
 from rsea_ros.nodes._qos import COMMAND, MEASUREMENT
+from rsea_ros.nodes._tap import Mailbox, MessageFields, Polled
 
 
 class Kind(NamedTuple):

@@ -14,7 +14,7 @@ from bench.driver.bare_loop import BareLoop
 from bench.processes import cpu_time
 from msg_adapters.cdr import STAMP
 from rsea_ros.nodes._cycle import SECOND
-from rsea_ros.nodes._mailbox import Polled
+from rsea_ros.nodes._tap import Polled
 from rsea_ros.nodes._waiter import Waiter
 from rsea_ros.records.record import FloatArray
 

@@ -5,10 +5,10 @@ from msg_adapters.ros import Bool, DiagnosticArray, JointState, torque_command_m
 from msg_adapters.topic_map import JOINT_STATE, WRENCH, sign_and_index
 from rsea_ros.nodes._cycle import SECOND, Cycle, on_grid
 from rsea_ros.nodes._health import OK, Health, NodeHealth
-from rsea_ros.nodes._mailbox import Mailbox, MessageFields
 from rsea_ros.nodes._parameters import AXIS, JOINT, NodeParameter
 from rsea_ros.nodes._qos import COMMAND, LATCHED, MEASUREMENT, await_arrival, publishers_of
 from rsea_ros.nodes._run import Component, Program
+from rsea_ros.nodes._tap import Mailbox, MessageFields
 
 __all__ = [
     "AXIS", "COMMAND", "JOINT", "JOINT_STATE", "LATCHED", "MEASUREMENT", "OK", "SECOND", "WRENCH", "Bool",

@@ -15,9 +15,9 @@ from rsea_ros.hardware.device import State
 from rsea_ros.nodes._commands import HORIZON, WATCHDOG, CommandQueue, Obeyed
 from rsea_ros.nodes._cycle import Anchor, Cycle
 from rsea_ros.nodes._health import OK, WARN, NodeHealth
-from rsea_ros.nodes._mailbox import Mailbox, MessageFields
 from rsea_ros.nodes._parameters import JOINT, NodeParameter
 from rsea_ros.nodes._qos import COMMAND, MEASURED, MEASUREMENT, OVERRIDES
+from rsea_ros.nodes._tap import Mailbox, MessageFields
 
 _AHEAD = "commands ahead"
 """Of who stamps ahead: then late ones are. Who stamps when sending is always late, and means on arrival."""

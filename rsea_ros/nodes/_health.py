@@ -9,8 +9,8 @@ from rclpy.clock_type import ClockType
 from rclpy.node import Node
 
 from msg_adapters.ros import ERROR, OK, WARN, DiagnosticArray, diagnostics_message
+from rsea_ros.nodes._cycle import raise_new_threads
 from rsea_ros.nodes._qos import COMMAND, Incompatible
-from rsea_ros.nodes._realtime import raise_new_threads
 
 __all__ = ["ERROR", "OK", "STEADY", "WARN", "Health", "NodeHealth"]
 

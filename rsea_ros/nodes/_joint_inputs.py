@@ -23,7 +23,7 @@ from rsea_ros.model.rig import Rig
 from rsea_ros.nodes import _qos
 from rsea_ros.nodes._commands import HORIZON
 from rsea_ros.nodes._cycle import SECOND
-from rsea_ros.nodes._mailbox import Mailbox, MessageFields
+from rsea_ros.nodes._tap import Mailbox, MessageFields
 from rsea_ros.records.record import FloatArray, IntArray, is_measured
 
 Keep = Callable[[str, str, int, bytes], None]

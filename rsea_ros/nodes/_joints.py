@@ -12,9 +12,9 @@ from rclpy.node import Node
 from rclpy.task import Future
 
 from rsea_ros.errors import ParameterError
+from rsea_ros.nodes._cycle import raise_new_threads
 from rsea_ros.nodes._health import STEADY
 from rsea_ros.nodes._parameters import NodeParameter
-from rsea_ros.nodes._realtime import raise_new_threads
 
 JOINTS = NodeParameter(
     "joints", [""], "names of several joints, each with topics and services under its name; [\"\"]: one",

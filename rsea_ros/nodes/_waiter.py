@@ -23,7 +23,7 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.subscription import Subscription
 
-from rsea_ros.nodes._realtime import Worker
+from rsea_ros.nodes._cycle import Worker
 
 FOR_EVER = -1
 Kind = Literal["subscription", "timer", "client", "service"]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -22,14 +21,12 @@ from rsea_ros.control.polarity import Polarity
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.nodes import _control
-from rsea_ros.nodes._control import TABLE, ControllerLimits, controller_of, design_of, summary, with_limits
-from rsea_ros.nodes._cycle import SECOND, Anchor
+from rsea_ros.nodes._control import TABLE, ControllerLimits, Measurements
+from rsea_ros.nodes._cycle import SECOND, Anchor, keep_time
 from rsea_ros.nodes._health import ERROR, OK, WARN, Health, NodeHealth
 from rsea_ros.nodes._joints import Jobs
-from rsea_ros.nodes._link import Measurements, link_of, link_values, link_words
 from rsea_ros.nodes._parameters import let_change
 from rsea_ros.nodes._qos import COMMAND, await_arrival
-from rsea_ros.nodes._realtime import keep_time
 from rsea_ros.nodes._run import Component, Program
 from rsea_ros.nodes._waiter import Waiter
 
@@ -47,11 +44,11 @@ class ControllerNode(Program):
     """
 
     def __init__(self, node: Node, values: dict[str, Any]) -> None:
-        self._stated, values = values, with_limits(values)
+        self._stated, values = values, _control.with_limits(values)
         self._node, self._values = node, values
-        self._design = design_of(values)
-        self._link = link_of(values, self._design)
-        self._controller = self._newest = controller_of(values, self._design, self._link.share)
+        self._design = _control.design_of(values)
+        self._link = _control.link_of(values, self._design)
+        self._controller = self._newest = _control.controller_of(values, self._design, self._link.share)
         self._period = SECOND / values["rate"]
         self._inputs = Measurements(
             node, values["axis"], self._period, values["joint"],
@@ -73,7 +70,7 @@ class ControllerNode(Program):
         self._lock = threading.Lock()
         node.create_service(Trigger, "~/clear_fault", self._clear)
         self._health = Health(node, self._report, values["rig"])
-        for line in (*summary(self._design), link_words(self._link)):
+        for line in (*_control.summary(self._design), f"{self._link}"):
             node.get_logger().info(line)
         self._waiter = Waiter(node, self._inputs.subscriptions, self._work, WATCH)
         keep_time(node, self._waiter, values)
@@ -86,13 +83,13 @@ class ControllerNode(Program):
         Raises ParameterError for gains that are unstable with a load, or a limit raised under torque.
         """
         stated = {**self._stated, **new}
-        derived = with_limits(stated)
+        derived = _control.with_limits(stated)
         values = {**self._values, **{name: derived[name] for name in new}}
         design, newest, link = self._design, self._newest, self._link
         if not new.keys().isdisjoint(_control.GAINS):
-            design = design_of(values)
-            share = link.share if link.encoder is None else link_of(values, design).share
-            link, newest = link._replace(share=share), controller_of(values, design, share)
+            design = _control.design_of(values)
+            share = link.share if link.encoder is None else _control.link_of(values, design).share
+            link, newest = link._replace(share=share), _control.controller_of(values, design, share)
         with self._lock:
             raised = [name for name in _control.LIMITS if values[name] > self._values[name]]
             if raised and self._wished and not self._fault:
@@ -266,7 +263,7 @@ class ControllerNode(Program):
             "late_commands": self._late,
             "feedback_share": f"{self._limits.lateness.trust:.2f}",
             "restarts": self._restarts,
-            **link_values(self._link),
+            **self._link.values(),
             **self._anchor.values(),
             "crossover_hz": f"{self._design.margins['locked'].crossover:.2f}",
             "phase_margin_deg": f"{worst.phase:.1f}",
@@ -312,4 +309,4 @@ NODE = Component("controller", TABLE, ControllerNode)
 main = NODE.run
 
 if __name__ == "__main__":
-    sys.exit(main())
+    raise SystemExit(main())

@@ -9,7 +9,6 @@ node stays active.
 from __future__ import annotations
 
 import os
-import sys
 import time
 from collections.abc import Sequence
 from contextlib import ExitStack, suppress
@@ -23,14 +22,12 @@ from rsea_ros.hardware.device import Device
 from rsea_ros.hardware.limits import CHANGEABLE
 from rsea_ros.hardware.outside import EXTRA_PATH, options_of
 from rsea_ros.nodes._bench_topics import COMMAND_TYPE, NAMES, SPRING_FRAME, Combined
-from rsea_ros.nodes._cycle import Anchor, Cycle
-from rsea_ros.nodes._device_parameters import ENCODER, LIMITS, MOTOR, SAFETY, SENSOR, devices_of
-from rsea_ros.nodes._devices import DEVICES
+from rsea_ros.nodes._cycle import REALTIME, Anchor, Cycle, keep_time, stop_keeping_time
+from rsea_ros.nodes._devices import DEVICES, ENCODER, LIMITS, MOTOR, SAFETY, SENSOR, devices_of
 from rsea_ros.nodes._drive import step
 from rsea_ros.nodes._joint import DrivenJoint, Offer, stop_of
 from rsea_ros.nodes._joints import JOINTS, Jobs, joint_table, joint_values
 from rsea_ros.nodes._parameters import NodeParameter, let_change, live
-from rsea_ros.nodes._realtime import REALTIME, keep_time, stop_keeping_time
 from rsea_ros.nodes._run import Component, Program, SignalListener
 
 TABLE = (
@@ -285,4 +282,4 @@ NODE = Component(
 main = NODE.run
 
 if __name__ == "__main__":
-    sys.exit(main())
+    raise SystemExit(main())

@@ -3,7 +3,6 @@
 It waits for a driver that is not active, and ends with one line where it has latched a fault.
 """
 
-import sys
 from typing import Any
 
 from rclpy.node import Node
@@ -103,4 +102,4 @@ NODE = Component("excite", TABLE, ExciteNode, endless=False)
 main = NODE.run
 
 if __name__ == "__main__":
-    sys.exit(main())
+    raise SystemExit(main())

@@ -4,7 +4,6 @@ It begins with earlier recordings (`bag`). ~/approve plays the proposed run,
 ~/decline ends the session, ~/cancel stops a run softly at any sample. The results are on /diagnostics.
 """
 
-import sys
 import threading
 from concurrent.futures import Future, ThreadPoolExecutor
 from functools import partial
@@ -236,4 +235,4 @@ NODE = Component("experiment", TABLE, ExperimentNode, endless=False)
 main = NODE.run
 
 if __name__ == "__main__":
-    sys.exit(main())
+    raise SystemExit(main())

@@ -3,7 +3,6 @@
 import math
 import os
 import shlex
-import sys
 import time
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
@@ -322,4 +321,4 @@ NODE = Component("health", TABLE, HealthNode)
 main = NODE.run
 
 if __name__ == "__main__":
-    sys.exit(main())
+    raise SystemExit(main())

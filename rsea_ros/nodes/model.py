@@ -1,7 +1,6 @@
 """model: torques on both ends by sample, and whether the actuator is a pure torque source just now."""
 
 import math
-import sys
 import threading
 from collections.abc import Mapping
 from typing import Any
@@ -20,12 +19,11 @@ from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.torque_band import TorqueBand
 from rsea_ros.model.transfer import pure_torque_bandwidth
 from rsea_ros.nodes._commands import WATCHDOG
-from rsea_ros.nodes._cycle import SECOND
+from rsea_ros.nodes._cycle import REALTIME, SECOND, keep_time
 from rsea_ros.nodes._health import OK, WARN, Health, NodeHealth
 from rsea_ros.nodes._joint_inputs import InputSettings, ModelInputs, noise_from, stopped_sensors
 from rsea_ros.nodes._parameters import AXIS, JOINT, NodeParameter, let_change, live
 from rsea_ros.nodes._qos import COMMAND, LATCHED, RECORD_RELIABLE, await_arrival
-from rsea_ros.nodes._realtime import REALTIME, keep_time
 from rsea_ros.nodes._run import Component, Program
 from rsea_ros.nodes._waiter import Waiter
 
@@ -288,4 +286,4 @@ NODE = Component("model", TABLE, ModelNode, patience=8.0)  # ros2 launch kills a
 main = NODE.run
 
 if __name__ == "__main__":
-    sys.exit(main())
+    raise SystemExit(main())

@@ -1,6 +1,5 @@
 """plant: a simulated bench in real time, for any rig."""
 
-import sys
 import time
 from typing import Any
 
@@ -85,4 +84,4 @@ NODE = Component("plant", TABLE, PlantNode)
 main = NODE.run
 
 if __name__ == "__main__":
-    sys.exit(main())
+    raise SystemExit(main())

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Iterable
 from typing import Any
@@ -15,11 +14,10 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from msg_adapters import iterate
 from msg_adapters.ros import Clock, clock_message, message_type
 from rsea_ros.errors import BagError, ParameterError
-from rsea_ros.nodes._cycle import SECOND, wait_until
+from rsea_ros.nodes._cycle import SECOND, Worker, wait_until
 from rsea_ros.nodes._health import OK, STEADY, Health, NodeHealth
 from rsea_ros.nodes._parameters import NodeParameter
 from rsea_ros.nodes._qos import DISCOVERY_TIME, LATCHED, RECORD_RELIABLE
-from rsea_ros.nodes._realtime import Worker
 from rsea_ros.nodes._run import Component
 
 TABLE = (
@@ -134,4 +132,4 @@ NODE = Component("replay", TABLE, ReplayNode, endless=False)
 main = NODE.run
 
 if __name__ == "__main__":
-    sys.exit(main())
+    raise SystemExit(main())

@@ -14,9 +14,8 @@ from rsea_ros.control.uncertainty import Uncertainty
 from rsea_ros.model.rig import EffectSetting, Sensor
 from rsea_ros.model.rig_file import load_rig, save_rig
 from rsea_ros.model.simulation import Plant
-from rsea_ros.nodes import _link as _measurements
-from rsea_ros.nodes._control import TABLE, summary, with_limits
-from rsea_ros.nodes._link import link_of, link_values, link_words
+from rsea_ros.nodes import _control as _measurements
+from rsea_ros.nodes._control import TABLE, link_of, summary, with_limits
 
 RATE = 280.0
 EPOCH, PERIOD = 1_700_000_000_000_000_000, 1e9 / RATE
@@ -44,8 +43,8 @@ def test_the_log_says_which_mode_a_design_tolerates_or_that_it_knows_none():
 def test_it_is_used_where_the_rig_has_the_sensor(tmp_path):
     link = link_of(values(bench(), tmp_path, impedance=1.2), DESIGN)
     assert link.share == LinkShare(0.25, 0.4, 20.0) and link.encoder is not None
-    assert "once deflection agrees with ft" in link_words(link)
-    assert link_values(link)["link"].startswith("not used: deflection and ft have not been compared")
+    assert "once deflection agrees with ft" in str(link)
+    assert link.values()["link"].startswith("not used: deflection and ft have not been compared")
 
 
 @pytest.mark.parametrize(
@@ -60,7 +59,7 @@ def test_it_is_used_where_the_rig_has_the_sensor(tmp_path):
 def test_it_is_not_used_and_the_node_says_why(tmp_path, rig, given, reason):
     link = link_of(values(rig, tmp_path, **given), DESIGN)
     assert link.share == LinkShare() and link.encoder is None
-    assert reason in link_words(link) and reason in link_values(link)["link"]
+    assert reason in str(link) and reason in link.values()["link"]
 
 
 class Post(dict):
@@ -148,7 +147,7 @@ def test_an_encoder_that_falls_silent_is_counted_and_shown(monkeypatch, run, tmp
     encoder, links = read(monkeypatch, run, lambda k, s: [(0.0, s.deflection)] if k < 400 else [])
     assert np.isfinite(links[300:400]).all() and not np.isfinite(links[402:]).any()
     link = link_of(values(bench(), tmp_path), DESIGN)._replace(encoder=encoder)
-    shown = link_values(link)
+    shown = link.values()
     assert shown["link"] == "not used: no deflection"
     assert (shown["link_losses"], shown["missing_deflections"]) == (1, encoder.missing)
     assert 190 <= encoder.missing <= 200

@@ -15,8 +15,7 @@ from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.rig_limits import check_travel
 from rsea_ros.nodes import _control, _devices, driver
-from rsea_ros.nodes._device_parameters import devices_of
-from rsea_ros.nodes._devices import DEVICES, limits_of
+from rsea_ros.nodes._devices import DEVICES, devices_of, limits_of
 
 DEFAULTS = {parameter.name: parameter.default for parameter in driver.TABLE}
 

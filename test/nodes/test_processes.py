@@ -113,7 +113,7 @@ def test_what_another_thread_has_just_destroyed_ends_no_node():
 PRIORITIES = """
 import os, subprocess, sys, threading
 from rsea_ros.errors import ParameterError
-from rsea_ros.nodes._realtime import raise_new_threads, raise_priority, stop_keeping_time
+from rsea_ros.nodes._cycle import raise_new_threads, raise_priority, stop_keeping_time
 
 def priorities():
     threads = first.native_id, 0, *(thread.native_id for thread in later)
@@ -154,7 +154,7 @@ def test_threads_that_keep_time_get_their_priority_all_others_one_below_and_chil
 AFFINITY = """
 import os, subprocess, sys, threading
 from types import SimpleNamespace
-from rsea_ros.nodes._realtime import PROCESSORS, keep_time, stop_keeping_time
+from rsea_ros.nodes._cycle import PROCESSORS, keep_time, stop_keeping_time
 
 def processors():
     threads = [os.sched_getaffinity(thread) for thread in (worker.thread.native_id, 0)]
