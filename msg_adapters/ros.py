@@ -88,16 +88,6 @@ def wrench_message(stamp_ns: int, values: Sequence[float], frame: str = "ft_sens
     return message
 
 
-def bool_message(value: bool) -> Bool:
-    """Return a flag."""
-    return Bool(data=value)
-
-
-def clock_message(stamp_ns: int) -> Clock:
-    """Return the time of a replay."""
-    return Clock(clock=time_of(stamp_ns))
-
-
 def diagnostics_message(
     stamp_ns: int, name: str, level: bytes, summary: str, values: Mapping[str, object], hardware: str = ""
 ) -> DiagnosticArray:

@@ -14,7 +14,6 @@ from typing import Any
 
 from rclpy.node import Node
 from rclpy.parameter_client import AsyncParameterClient
-from rclpy.serialization import serialize_message
 
 from rsea_extras.watch.command import Bounds, Commander
 from rsea_extras.watch.desk import Runs
@@ -146,8 +145,7 @@ class WatchCommand:
         self.commander = Commander()
         self.why_not = "nothing is known of the bench yet"
         self._publisher = node.create_publisher(ros.JointState, "torque_command", ros.COMMAND)
-        template = serialize_message(ros.torque_command_message(0, 0.0, values["joint"]))
-        self._writer = ros.RawWriter(template, ros.JOINT_STATE, "effort")
+        self._writer = ros.raw_writer(ros.torque_command_message(0, 0.0, values["joint"]), "effort")
         self._bench = ""
         self._client: AsyncParameterClient | None = None
         self._asked = -math.inf

@@ -11,16 +11,23 @@ from typing import Any
 from rclpy.callback_groups import CallbackGroup
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
+from rclpy.serialization import serialize_message
 from rclpy.subscription import Subscription
 
-from msg_adapters.cdr import RawReader
+from msg_adapters import ros
+from msg_adapters.cdr import RawReader, RawWriter
 from msg_adapters.contents import Contents
 from msg_adapters.reading import record_from
-from msg_adapters.ros import message_type
-from msg_adapters.topic_map import ROLES, TYPES, TopicMap
+from msg_adapters.topic_map import JOINT_STATE, ROLES, TYPES, WRENCH, TopicMap
 from rsea_ros.errors import ParameterError
 from rsea_ros.nodes._qos import OVERRIDES, RECORD, RECORD_RELIABLE, Incompatible
 from rsea_ros.records.record import Record
+
+
+def raw_writer(template: ros.JointState | ros.WrenchStamped, *fields: str) -> RawWriter:
+    """Return what writes a stamp and fields into copies of a message: 60 us less a cycle than making them."""
+    kind = JOINT_STATE if isinstance(template, ros.JointState) else WRENCH
+    return RawWriter(serialize_message(template), kind, *fields)
 
 
 class Polled(CallbackGroup):
@@ -59,7 +66,7 @@ class Mailbox:
         """
         self._node, self._topic, self._refuse, self._admit = node, topic, refuse, admit
         self._keep = keep
-        self._kind = message_type(read.msgtype)
+        self._kind = ros.message_type(read.msgtype)
         self._reader = RawReader(read.msgtype, read.fields, read.joint, read.most)
         self.subscription: Any = node.create_subscription(
             self._kind, topic, lambda message: None, qos, callback_group=Polled(), raw=True,
@@ -139,7 +146,7 @@ class Ears:
         self.begin()
         self.taps = {
             role: Tap(
-                node, message_type(TYPES[role]), role, RECORD_RELIABLE if role in reliable else RECORD,
+                node, ros.message_type(TYPES[role]), role, RECORD_RELIABLE if role in reliable else RECORD,
                 partial(self._keep, role),
             )
             for role in ROLES

@@ -10,11 +10,8 @@ from dataclasses import replace
 from typing import Any
 
 from rclpy.node import Node
-from rclpy.serialization import serialize_message
 
-from msg_adapters.cdr import RawWriter
 from msg_adapters.ros import JointState, Trigger, torque_command_message
-from msg_adapters.topic_map import TYPES
 from rsea_ros.control.controller import Measurement
 from rsea_ros.control.grid import Grid
 from rsea_ros.control.polarity import Polarity
@@ -28,6 +25,7 @@ from rsea_ros.nodes._joints import Jobs
 from rsea_ros.nodes._parameters import let_change
 from rsea_ros.nodes._qos import COMMAND, await_arrival
 from rsea_ros.nodes._run import Component, Program
+from rsea_ros.nodes._tap import raw_writer
 from rsea_ros.nodes._waiter import Waiter
 
 WATCH = 0.005
@@ -65,8 +63,7 @@ class ControllerNode(Program):
         self._told_losses, self._told_ignored = 0, dict[str, int]()
         self._squares: list[float] = []
         self._commands = node.create_publisher(JointState, "torque_command", COMMAND)
-        template = serialize_message(torque_command_message(0, 0.0, values["joint"]))
-        self._writer = RawWriter(template, TYPES["torque_command"], "effort")
+        self._writer = raw_writer(torque_command_message(0, 0.0, values["joint"]), "effort")
         self._lock = threading.Lock()
         node.create_service(Trigger, "~/clear_fault", self._clear)
         self._health = Health(node, self._report, values["rig"])

@@ -6,11 +6,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from rclpy.node import Node
-from rclpy.serialization import serialize_message
 
-from msg_adapters.cdr import RawWriter
-from msg_adapters.ros import Bool, JointState, bool_message, efforts_message
-from msg_adapters.topic_map import TYPES
+from msg_adapters.ros import Bool, JointState, efforts_message
 from rsea_ros.model.observer import Noise, Observer, TorqueEstimate
 from rsea_ros.model.observer.assemble import Consistency, consistency
 from rsea_ros.model.pure_torque_error import PURE, ErrorFlag, ErrorSettings
@@ -25,6 +22,7 @@ from rsea_ros.nodes._joint_inputs import InputSettings, ModelInputs, noise_from,
 from rsea_ros.nodes._parameters import AXIS, JOINT, NodeParameter, let_change, live
 from rsea_ros.nodes._qos import COMMAND, LATCHED, RECORD_RELIABLE, await_arrival
 from rsea_ros.nodes._run import Component, Program
+from rsea_ros.nodes._tap import raw_writer
 from rsea_ros.nodes._waiter import Waiter
 
 EVERY = 128
@@ -184,7 +182,7 @@ class Flags:
             await_arrival(publisher)
 
     def _publish(self) -> None:
-        self._bare.publish(bool_message(self._up))
+        self._bare.publish(Bool(data=self._up))
         self._stamped.publish(efforts_message(self._stamp, {NAME: float(self._up)}))
 
 
@@ -231,8 +229,7 @@ class ModelNode(Program):
         self._observer = Observer(rig, noise, hold=WATCHDOG / SECOND, duration=values["duration"])
         qos = RECORD_RELIABLE if values["reliable"] else COMMAND
         self._estimates = node.create_publisher(JointState, "torque_estimate", qos)
-        template = serialize_message(efforts_message(0, dict.fromkeys(NAMES, 0.0)))
-        self._writer = RawWriter(template, TYPES["joint_states"], "effort")
+        self._writer = raw_writer(efforts_message(0, dict.fromkeys(NAMES, 0.0)), "effort")
         self._flags, self._has_ft = Flags(node), "ft" in rig.sensors
         read = InputSettings(**{n: values[n] for n in ("ft_timeout", "axis", "reliable", "joint")})
         self._stopped = stopped_sensors(rig, noise)

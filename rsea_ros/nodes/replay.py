@@ -12,7 +12,7 @@ from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 
 from msg_adapters import iterate
-from msg_adapters.ros import Clock, clock_message, message_type
+from msg_adapters.ros import Clock, message_type, time_of
 from rsea_ros.errors import BagError, ParameterError
 from rsea_ros.nodes._cycle import SECOND, Worker, wait_until
 from rsea_ros.nodes._health import OK, STEADY, Health, NodeHealth
@@ -102,7 +102,7 @@ class ReplayNode(Worker):
         now = time.monotonic_ns()
         if self._clock is None or now - ticked < CLOCK_PERIOD:
             return ticked
-        self._clock.publish(clock_message(logged))
+        self._clock.publish(Clock(clock=time_of(logged)))
         return now
 
     def is_finished(self) -> bool:
