@@ -12,8 +12,7 @@ from __future__ import annotations
 import math
 
 from rsea_ros.control.controller import Measurement
-from rsea_ros.control.sign_change import SignChange
-from rsea_ros.control.sign_evidence import DOUBT, MOVED, POWER, RIGHT, SIGNS, SWAY, SignEvidence
+from rsea_ros.control.sign_evidence import DOUBT, MOVED, POWER, RIGHT, SIGNS, SWAY, SignChange, SignEvidence
 from rsea_ros.model.rig import Rig
 from rsea_ros.records.record import HUGE, is_measured
 

@@ -13,8 +13,7 @@ from rsea_ros.control.compensation import compensation
 from rsea_ros.control.controller import ControllerSettings, Measurement, TorqueController, TorqueLimits
 from rsea_ros.control.grid import Lateness, Tolerance
 from rsea_ros.control.law import Gains, law_of
-from rsea_ros.control.link import LinkMotion, LinkShare, link_share
-from rsea_ros.control.spring_encoder import SpringEncoder, SpringReading, spread
+from rsea_ros.control.link import LinkMotion, LinkShare, SpringEncoder, SpringReading, link_share, spread
 from rsea_ros.control.synthesis import ControllerDesign, DesignLimits, check, design
 from rsea_ros.control.uncertainty import LIGHTEST, lightest, load_range, load_uncertainty
 from rsea_ros.errors import ParameterError

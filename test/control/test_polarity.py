@@ -10,8 +10,7 @@ import pytest
 from rsea_ros.control.controller import Measurement, TorqueController
 from rsea_ros.control.following import reading
 from rsea_ros.control.polarity import Polarity
-from rsea_ros.control.sign_change import SignChange
-from rsea_ros.control.sign_evidence import SignEvidence
+from rsea_ros.control.sign_evidence import SignChange, SignEvidence
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.simulation import Plant
 from test.control.benches import FREE, GAINS, RATE, RIG, play, wave

@@ -11,9 +11,8 @@ from bench.control.human import Virtual, measure_impedance
 from rsea_ros.control.controller import ControllerSettings, Measurement, TorqueController
 from rsea_ros.control.following import closed_loop
 from rsea_ros.control.law import law_of
-from rsea_ros.control.link import LinkMotion, LinkShare, link_share
+from rsea_ros.control.link import LinkMotion, LinkShare, SpringEncoder, SpringReading, link_share
 from rsea_ros.control.margins import distal_responses, link_response
-from rsea_ros.control.spring_encoder import SpringEncoder, SpringReading
 from rsea_ros.control.study import disturbed_rig, lagging_corners
 from rsea_ros.control.synthesis import DesignLimits
 from rsea_ros.model.rig import Sensor

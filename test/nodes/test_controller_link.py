@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from rsea_ros.control.law import Gains
-from rsea_ros.control.link import LinkShare
-from rsea_ros.control.spring_encoder import SpringEncoder
+from rsea_ros.control.link import LinkShare, SpringEncoder
 from rsea_ros.control.synthesis import ControllerDesign
 from rsea_ros.control.uncertainty import Uncertainty
 from rsea_ros.model.rig import EffectSetting, Sensor
