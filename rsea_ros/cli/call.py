@@ -1,15 +1,9 @@
 """`rsea call`: call a running node without `ros2 service` and `ros2 lifecycle`."""
 
-from __future__ import annotations
-
 import argparse
-from typing import TYPE_CHECKING
 
 from rsea_ros.cli._processes import need_ros
 from rsea_ros.cli._terminal import columns, positive
-
-if TYPE_CHECKING:
-    from rsea_ros.nodes._visitor import Caller
 
 HELP = "call a running node: activate, deactivate, clear_fault, stop …"
 EXAMPLE = "rsea call driver configure activate"
@@ -33,16 +27,6 @@ def run(args: argparse.Namespace) -> int:
         if not args.action:
             name = args.node
             nodes = [caller.full_name(name)] if name else caller.callable_nodes(args.seconds)
-            rows = [(each, *offer_of(caller, each)) for each in nodes]
+            rows = [(each, *caller.offer(each)) for each in nodes]
             print(columns([("node", "state", "actions"), *rows]) if rows else "no node that can be called")
     return 0
-
-
-def offer_of(caller: Caller, node: str) -> tuple[str, str]:
-    """Return the state of a node and what it would do now; a node that hangs does not hide the others."""
-    from rsea_ros.nodes._visitor import CallRefused
-
-    try:
-        return caller.state(node) or "-", ", ".join(caller.actions(node))
-    except CallRefused:
-        return "no answer", "-"

@@ -23,6 +23,7 @@ from rsea_ros.model.rig import Rig
 from rsea_ros.nodes import _qos
 from rsea_ros.nodes._commands import HORIZON
 from rsea_ros.nodes._cycle import SECOND
+from rsea_ros.nodes._parameters import NodeParameter
 from rsea_ros.nodes._tap import Mailbox, MessageFields
 from rsea_ros.records.record import FloatArray, IntArray, is_measured
 
@@ -348,6 +349,10 @@ class HealthInputs(JointTopics):
         return (self.epoch or 0) + round(t * SECOND)
 
 
+IDENTIFICATION = NodeParameter(
+    "identification", "", "identification.json whose measured noise counts; empty: that of the rig"
+)
+"""Of a node that knows the noise of its joint."""
 _EXPECTED = "expected an identification.json of rsea identify"
 
 

@@ -115,13 +115,11 @@ class Listener:
 
     def _type_of(self, name: str) -> str:
         """Return the type of a topic. Raises ParameterError when nobody publishes it."""
-        deadline = time.monotonic() + DISCOVERY
         known: dict[str, list[str]] = {}
-        while time.monotonic() < deadline:
+        for _ in _looks(DISCOVERY):
             known = dict(self._node.get_topic_names_and_types())
             if known.get(name) and self._node.count_publishers(name):
                 return known[name][0]
-            time.sleep(POLL)
         near = did_you_mean(name, known)
         raise ParameterError(f"topic {name}: nobody publishes it{near} (rsea topics lists what there is)")
 
@@ -167,6 +165,13 @@ class Caller:
         if not self._has_lifecycle(name):
             return ""
         return str(self._question(ros.GetState, f"{name}/get_state").current_state.label)
+
+    def offer(self, name: str) -> tuple[str, str]:
+        """Return the state of a node and what it would do now, in words, also for one that hangs."""
+        try:
+            return self.state(name) or "-", ", ".join(self.actions(name))
+        except CallRefused:
+            return "no answer", "-"
 
     def call(self, name: str, action: str) -> str:
         """Do one action of a node and return its answer.

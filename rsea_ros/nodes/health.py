@@ -23,7 +23,7 @@ from rsea_ros.model.rig_file import load_rig
 from rsea_ros.nodes._commands import WATCHDOG
 from rsea_ros.nodes._cycle import SECOND
 from rsea_ros.nodes._health import OK, STEADY, WARN, Health, NodeHealth
-from rsea_ros.nodes._joint_inputs import Events, HealthInputs, noise_from
+from rsea_ros.nodes._joint_inputs import IDENTIFICATION, Events, HealthInputs, noise_from
 from rsea_ros.nodes._parameters import AXIS, JOINT, NodeParameter, let_change, live
 from rsea_ros.nodes._qos import COMMAND
 from rsea_ros.nodes._run import NAMESPACE, Component, Program
@@ -187,9 +187,7 @@ TABLE = live((
     NodeParameter(
         "rig", "paper_high_impedance", "the joint as it was: a name of config/rigs, or the last model.yaml"
     ),
-    NodeParameter(
-        "identification", "", "identification.json whose measured noise counts; empty: that of the rig"
-    ),
+    IDENTIFICATION,
     AXIS,
     JOINT,
     NodeParameter("false_alarms", 1e-3, "of changes, at most so many an hour", "1/h", 1e-6, 10.0),

@@ -18,7 +18,13 @@ from rsea_ros.model.transfer import pure_torque_bandwidth
 from rsea_ros.nodes._commands import WATCHDOG
 from rsea_ros.nodes._cycle import REALTIME, SECOND, keep_time
 from rsea_ros.nodes._health import OK, WARN, Health, NodeHealth
-from rsea_ros.nodes._joint_inputs import InputSettings, ModelInputs, noise_from, stopped_sensors
+from rsea_ros.nodes._joint_inputs import (
+    IDENTIFICATION,
+    InputSettings,
+    ModelInputs,
+    noise_from,
+    stopped_sensors,
+)
 from rsea_ros.nodes._parameters import AXIS, JOINT, NodeParameter, let_change, live
 from rsea_ros.nodes._qos import COMMAND, LATCHED, RECORD_RELIABLE, await_arrival
 from rsea_ros.nodes._run import Component, Program
@@ -193,9 +199,7 @@ TABLE = live((
     NodeParameter(
         "rig", "paper_high_impedance", "the model: a name of config/rigs, or a file such as model.yaml"
     ),
-    NodeParameter(
-        "identification", "", "identification.json whose measured noise counts; empty: that of the rig"
-    ),
+    IDENTIFICATION,
     AXIS,
     NodeParameter(
         "duration", 60.0, "time over which drifts of the model come to their full size", "s", 1.0, 1e6

@@ -18,7 +18,6 @@ from rclpy.lifecycle import LifecycleNode
 from msg_adapters.ros import Trigger
 from rsea_ros import processes
 from rsea_ros.cli import main as cli, run
-from rsea_ros.cli.call import offer_of
 from rsea_ros.cli.launch import node_calls, together
 from rsea_ros.cli.run import ros_arguments
 from rsea_ros.errors import ParameterError
@@ -132,7 +131,7 @@ def test_a_node_that_hangs_is_listed_as_such(visitor, monkeypatch):
     monkeypatch.setattr(_visitor, "DISCOVERY", 0.1)
     caller = _visitor.Caller(visitor)
     assert any("/rsea/mute" in caller.callable_nodes(0.0) for _ in _visitor._looks(3.0))
-    assert offer_of(caller, "/rsea/mute") == ("no answer", "-")
+    assert caller.offer("/rsea/mute") == ("no answer", "-")
 
 
 def test_a_named_node_is_listed_without_a_question_to_the_others(visitor, monkeypatch, capsys):

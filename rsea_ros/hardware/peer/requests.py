@@ -43,13 +43,15 @@ class LineRequests:
         self.descriptor, self._outlet, self._text = inlet, outlet, b""
         self.pauses: deque[tuple[int, int]] = deque(maxlen=KEPT)
         self._does: dict[str, Callable[[int, Request], object]] = {
-            "misbehave": self._misbehave, "set": self._set, "alert": self._alert, "sag": self._sag,
+            "misbehave": self._misbehave, "set": self._set, "sag": self._sag,
+            "alert": lambda now, r: self._motor.shut_down(now, int(r["bits"])),
             "vanish": lambda now, r: bus.vanish(), "appear": lambda now, r: bus.appear(r.get("name", "")),
             "ft_gap": lambda now, r: sensor.gap(int(r["records"])),
             "ft_restart": lambda now, r: sensor.restart(),
             "ft_rate": lambda now, r: sensor.set_rate(float(r["rate"])),
-            "reverse": self._reverse, "ft_status": self._ft_status, "model": self._model,
-            "firmware": self._firmware, "watch": self._watch, "log": self._log,
+            "ft_status": lambda now, r: setattr(sensor, "status", int(r.get("bits", SATURATED))),
+            "watch": lambda now, r: setattr(sensor, "keep", bool(r.get("on", True))),
+            "reverse": self._reverse, "model": self._model, "firmware": self._firmware, "log": self._log,
             "pauses": lambda now, r: [pause for pause in self.pauses if pause[0] >= int(r.get("since", 0))],
             "torque": lambda now, r: [self._motor.acting_goal(), bool(self._motor.get("torque_enable"))],
         }  # fmt: skip
@@ -99,9 +101,6 @@ class LineRequests:
         for name in set(request) - {"do"}:
             self._motor.put(name, int(request[name]))
 
-    def _alert(self, now: int, request: Request) -> None:
-        self._motor.shut_down(now, int(request["bits"]))
-
     def _sag(self, now: int, request: Request) -> None:
         self._motor.put("voltage", round(10 * float(request["voltage"])))
         if float(request["voltage"]) < LOWEST_VOLTAGE:
@@ -112,18 +111,12 @@ class LineRequests:
         turned = self._sensor if request.get("ft") else self._motor
         turned.sign = -turned.sign
 
-    def _ft_status(self, now: int, request: Request) -> None:
-        self._sensor.status = int(request.get("bits", SATURATED))
-
     def _model(self, now: int, request: Request) -> None:
         """Answer pings with another model number; the table stays."""
         self._motor.memory[0:2] = int(request["number"]).to_bytes(2, "little")
 
     def _firmware(self, now: int, request: Request) -> None:
         self._motor.memory[6] = int(request["number"])
-
-    def _watch(self, now: int, request: Request) -> None:
-        self._sensor.keep = bool(request.get("on", True))
 
     def _log(self, now: int, request: Request) -> dict[str, Any]:
         since = int(request.get("since", 0))
