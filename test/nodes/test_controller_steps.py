@@ -9,8 +9,10 @@ import pytest
 
 from rsea_ros.control.controller import Measurement
 from rsea_ros.control.grid import Grid
+from rsea_ros.control.link import LinkShare
 from rsea_ros.nodes import controller as module
 from rsea_ros.nodes._commands import CommandQueue, Obeyed
+from rsea_ros.nodes._control import LinkFeedforward
 from rsea_ros.nodes._health import ERROR, OK, WARN
 from rsea_ros.nodes.controller import ControllerNode
 
@@ -32,7 +34,7 @@ def made(monkeypatch):
     node._design = SimpleNamespace(margins={
         n: SimpleNamespace(crossover=c, phase=p, gain=g, delay=d) for n, (c, p, g, d) in margins.items()
     })  # fmt: skip
-    node._link = SimpleNamespace(encoder=None, reason="link is false")
+    node._link = LinkFeedforward(LinkShare(), None, "link is false")
     senders = {what: Obeyed() for what in ("joint_states", "wrenches", "desired torques")}
     node._inputs = SimpleNamespace(unusable=2, senders=senders, hear_desired=lambda anchor: None)
     node._desired = SimpleNamespace(

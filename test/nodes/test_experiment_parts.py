@@ -21,7 +21,7 @@ def node(monkeypatch):
     """Return a node without its threads, and what it did."""
     made, calls = ExperimentNode.__new__(ExperimentNode), []
     for name in ("shape_words", "end_sentence", "known_causes"):
-        monkeypatch.setattr(module, name, lambda what, name=name: f"{name} of {what}")
+        monkeypatch.setattr(module.words, name, lambda what, name=name: f"{name} of {what}")
     log = SimpleNamespace(info=calls.append, warning=calls.append)
     made._node, made.calls = SimpleNamespace(get_logger=lambda: log), calls
     made._values = {"ask": True, "approval": 10.0, "bag": "a,,b", "lead": 0.1, "joint": "hip"}
@@ -154,7 +154,7 @@ def test_the_report_says_what_it_does_or_how_it_ended(node):
 
 def test_the_end_is_written_with_a_diagnosis_of_all_runs(node, monkeypatch):
     node._campaign = SimpleNamespace(rig="rig", causes="causes")
-    monkeypatch.setattr(module, "write_campaign", lambda outcome, campaign, out: out / "report.html")
+    monkeypatch.setattr(module.words, "write_campaign", lambda outcome, campaign, out: out / "report.html")
     monkeypatch.setattr(module, "diagnose_together", lambda *a: a)
     monkeypatch.setattr(module, "diagnosis_sentence", lambda verdict: f"sentence of {verdict}")
     monkeypatch.setattr(module, "write_diagnosis", lambda *a: node.calls.append(a[1]))
