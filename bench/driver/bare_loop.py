@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rsea_ros.hardware.peer.protocol2 import instruction
+from rsea_ros.hardware.peer.serial_line import instruction
 
 PATIENCE = 1.0
 """s for a reply."""

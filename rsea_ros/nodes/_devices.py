@@ -8,11 +8,11 @@ from msg_adapters.topic_map import sign_and_index
 from rsea_ros.errors import ParameterError, RseaError
 from rsea_ros.hardware.bus_motor import BusMotor
 from rsea_ros.hardware.device import Device, Spring
+from rsea_ros.hardware.dynamixel.bus import BAUD_RATES
 from rsea_ros.hardware.dynamixel.control_tables import MotorConnection, usual_latency
 from rsea_ros.hardware.dynamixel.encoder import LINK, SPRING, BusEncoder, EncoderConnection
 from rsea_ros.hardware.dynamixel.line import Line, LineMotor
 from rsea_ros.hardware.dynamixel.motor import Motor
-from rsea_ros.hardware.dynamixel.port import BAUD_RATES
 from rsea_ros.hardware.limits import UNRATED, Limits, Rating
 from rsea_ros.hardware.mit_can.motor import CanConnection, MitMotor
 from rsea_ros.hardware.motor_netft import CONFIGURE, ROBOTIS, ZEROS, MotorNetft

@@ -12,13 +12,12 @@ from contextlib import suppress
 import pytest
 
 from rsea_ros.hardware.device import NoReply, PortLost
-from rsea_ros.hardware.dynamixel.bus import Bus, PacketHandler
+from rsea_ros.hardware.dynamixel.bus import Bus, PacketHandler, SerialPort, Turns
 from rsea_ros.hardware.dynamixel.control_tables import TABLES, MotorConnection, TorqueConstant
 from rsea_ros.hardware.dynamixel.frames import StatusFrameParser, frame, stuff, unstuff
 from rsea_ros.hardware.dynamixel.motor import Motor
-from rsea_ros.hardware.dynamixel.port import SerialPort, Turns
-from rsea_ros.hardware.peer import protocol2
-from rsea_ros.hardware.peer.protocol2 import status
+from rsea_ros.hardware.peer import serial_line as protocol2
+from rsea_ros.hardware.peer.serial_line import status
 
 ALPHABET = (0xFF, 0xFD, 0x00, 0x55)
 VECTORS = {

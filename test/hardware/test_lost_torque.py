@@ -15,7 +15,7 @@ import pytest
 from rsea_ros.errors import DeviceError
 from rsea_ros.hardware import supervisor
 from rsea_ros.hardware.device import PortLost
-from rsea_ros.hardware.dynamixel.port import SerialPort
+from rsea_ros.hardware.dynamixel.bus import SerialPort
 from rsea_ros.hardware.protection import ANSWER, SupervisorLost
 from test.hardware.conftest import Loop, well_behaved
 from test.nodes.stalls import until

@@ -13,8 +13,7 @@ from rsea_ros.cli.bench import _motors
 from rsea_ros.hardware.device import State
 from rsea_ros.hardware.peer.ft import ForceSensor, Misbehaviour
 from rsea_ros.hardware.peer.peer_motor import ACCESS, LENGTH, EmulatedEncoder, EmulatedMotor
-from rsea_ros.hardware.peer.protocol2 import instruction
-from rsea_ros.hardware.peer.serial_line import EmulatedBus
+from rsea_ros.hardware.peer.serial_line import EmulatedBus, instruction
 
 UNIT = 2.69e-3 * 1.783
 """N m of a count of an XM430-W350's current."""

@@ -9,8 +9,8 @@ import pytest
 
 from rsea_ros.errors import RseaError
 from rsea_ros.hardware.device import PortLost, State
+from rsea_ros.hardware.dynamixel.bus import SerialPort
 from rsea_ros.hardware.dynamixel.control_tables import TABLES
-from rsea_ros.hardware.dynamixel.port import SerialPort
 from rsea_ros.hardware.limits import Limits
 from rsea_ros.hardware.motor_netft import CONFIGURE, MOTOR, ROBOTIS
 from rsea_ros.hardware.peer.peer_motor import ACCESS, LIMIT, RANGE, EmulatedMotor

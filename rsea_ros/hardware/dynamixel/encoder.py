@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 from rsea_ros.hardware.bus_motor import Unwrapper
 from rsea_ros.hardware.device import NoReply, State
-from rsea_ros.hardware.dynamixel.bus import Bus
-from rsea_ros.hardware.dynamixel.port import SerialPort
+from rsea_ros.hardware.dynamixel.bus import Bus, SerialPort
 
 SPRING, LINK = "spring", "link"
 SIZE = 4

@@ -11,11 +11,10 @@ from typing import NamedTuple
 
 from rsea_ros.errors import DeviceError
 from rsea_ros.hardware.device import NoReply, PortLost, State
-from rsea_ros.hardware.dynamixel.bus import ALERT
+from rsea_ros.hardware.dynamixel.bus import ALERT, SerialPort
 from rsea_ros.hardware.dynamixel.control_tables import ControlTable, MotorConnection
 from rsea_ros.hardware.dynamixel.frames import BROADCAST, StatusFrameParser, frame
 from rsea_ros.hardware.dynamixel.motor import Motor
-from rsea_ros.hardware.dynamixel.port import SerialPort
 
 SYNC_READ, SYNC_WRITE, FAST_SYNC_READ = 0x82, 0x83, 0x8A
 EMPTY = 11

@@ -9,10 +9,9 @@ from rsea_ros.errors import DeviceError, ParameterError
 from rsea_ros.hardware.bus_motor import BusMotor, T
 from rsea_ros.hardware.device import NoReply, PortLost, State
 from rsea_ros.hardware.dynamixel import control_tables
-from rsea_ros.hardware.dynamixel.bus import ALERT, Bus
+from rsea_ros.hardware.dynamixel.bus import ALERT, Bus, SerialPort
 from rsea_ros.hardware.dynamixel.control_tables import ControlTable, Item, MotorConnection, TorqueConstant
 from rsea_ros.hardware.dynamixel.frames import frame
-from rsea_ros.hardware.dynamixel.port import SerialPort
 from rsea_ros.hardware.limits import Limits, Rating
 from rsea_ros.hardware.protection import BUS_WATCHDOG, Protection, Supervised
 
