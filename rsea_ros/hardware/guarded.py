@@ -422,8 +422,8 @@ class GuardedDevice:
     @property
     def ft_source(self) -> str:
         """Where the wrench of the newest reading comes from, in words."""
-        if self.state is None or self.state.wrench is None or self._spring is None:
-            return "none" if self.state is None or self.state.wrench is None else "sensor"
+        if self.state is None or self.state.wrench is None:
+            return "none"
         return f"{self._spring}" if self.state.inferred else "sensor"
 
     def _read(self) -> State:

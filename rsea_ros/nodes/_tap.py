@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -131,6 +131,13 @@ class Tap:
 
     def _on_lost(self, status: Any) -> None:
         self.lost = status.total_count
+
+
+def heard(taps: Mapping[str, Tap]) -> tuple[str, dict[str, int], int]:
+    """Return the numbers of messages in words and by name, those that there are; how many were lost."""
+    counts = {name: tap.count for name, tap in taps.items() if tap.count}
+    words = ", ".join(f"{count} {name}" for name, count in counts.items())
+    return words, counts, sum(tap.lost for tap in taps.values())
 
 
 class Ears:

@@ -27,7 +27,7 @@ from rsea_ros.model.rig_file import load_rig
 from rsea_ros.nodes._health import OK, WARN, Health, NodeHealth
 from rsea_ros.nodes._parameters import AXIS, NodeParameter
 from rsea_ros.nodes._run import Component
-from rsea_ros.nodes._tap import Ears
+from rsea_ros.nodes._tap import Ears, heard
 from rsea_ros.outputs.files import Destination, check_free, unused_path
 from rsea_ros.records.record import Record
 from rsea_ros.report.diagnosis.words import diagnosis_sentence
@@ -226,11 +226,8 @@ class IdentifyNode:
         self._diagnosing.close()
 
     def _progress_text(self) -> str:
-        lost = sum(tap.lost for tap in self._ears.taps.values())
-        return (
-            ", ".join(f"{tap.count} {role}" for role, tap in self._ears.taps.items() if tap.count)
-            + f", {lost} lost"
-        )
+        words, _, lost = heard(self._ears.taps)
+        return f"{words}, {lost} lost"
 
     def _tell(self) -> None:
         log = self._node.get_logger()

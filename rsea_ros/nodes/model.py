@@ -274,7 +274,6 @@ class ModelNode(Program):
             return self._assess.report()
 
     def is_finished(self) -> bool:
-        """Run until stopped."""
         return not self._waiter.is_running()
 
     def close(self) -> None:

@@ -67,7 +67,6 @@ class PlantNode(Program):
         self._topics.publish(self._device.read())
 
     def is_finished(self) -> bool:
-        """Run until stopped."""
         return not self._cycle.is_running()
 
     def close(self) -> None:

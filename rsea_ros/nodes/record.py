@@ -19,7 +19,7 @@ from rsea_ros.nodes._health import OK, STEADY, WARN, Health, NodeHealth
 from rsea_ros.nodes._parameters import NodeParameter
 from rsea_ros.nodes._qos import RECORD, RECORD_LATCHED, RECORD_RELIABLE, offered
 from rsea_ros.nodes._run import Component
-from rsea_ros.nodes._tap import Tap
+from rsea_ros.nodes._tap import Tap, heard
 from rsea_ros.outputs.files import unused_path
 
 TOPICS = {
@@ -134,23 +134,16 @@ class RecordNode:
         self._tell()
 
     def close(self) -> None:
-        """Complete the bag."""
         self._bag.__exit__(*sys.exc_info())
 
-    def _counts(self) -> dict[str, int]:
-        return {name: tap.count for name, tap in self._taps.items() if tap.count}
-
-    def _lost_count(self) -> int:
-        return sum(tap.lost for tap in self._taps.values())
-
     def _tell(self) -> None:
-        counts = ", ".join(f"{count} {name}" for name, count in self._counts().items())
-        self._node.get_logger().info(f"{counts or 'nothing yet'}; {self._lost_count()} lost")
+        words, _, lost = heard(self._taps)
+        self._node.get_logger().info(f"{words or 'nothing yet'}; {lost} lost")
 
     def _report(self) -> NodeHealth:
-        lost = self._lost_count()
+        _, counts, lost = heard(self._taps)
         summary = f"{lost} messages lost" if lost else "recording"
-        return NodeHealth(WARN if lost else OK, summary, {**self._counts(), "lost_messages": lost})
+        return NodeHealth(WARN if lost else OK, summary, {**counts, "lost_messages": lost})
 
 
 NODE = Component("record", TABLE, RecordNode)

@@ -88,7 +88,8 @@ class Sequence:
         """Count a record; return whether it is newer than all before and may be used."""
         step = 1 if self._rdt is None else (record.sequence - self._rdt) % _WORD
         ft_step = 1 if self._ft is None else (record.ft_sequence - self._ft) % _WORD
-        kind = _kind(step) or _ft_kind(ft_step, record.ft_sequence)
+        anew = "restarted" if record.ft_sequence < LONGEST_GAP else "damaged"  # near zero: it was off
+        kind = "duplicate" if step == 0 else _kind(step) or _kind(ft_step, anew)
         if kind and kind != "restarted" and self._another_stream(record):
             self.counts["resynchronised"] += 1
             step, ft_step, kind = 1, 1, ""
@@ -115,26 +116,11 @@ class Sequence:
         return self._strays >= RESYNCHRONISE
 
 
-def _ft_kind(step: int, counter: int) -> str:
-    """Return the fault in a step of ft_sequence; '' for none, also after a gap.
-
-    A counter that restarts near zero means a sensor that was off; any other jump is damage, until it
-    continues.
-    """
+def _kind(step: int, far: str = "damaged") -> str:
+    """Return the fault in a step of a counter, `far` in one that no gap makes; '' for none and for a gap."""
     if step < LONGEST_GAP:
         return ""
-    if _WORD - step <= REORDERED:
-        return "reordered"
-    return "restarted" if counter < LONGEST_GAP else "damaged"
-
-
-def _kind(step: int) -> str:
-    """Return the fault in a step of rdt_sequence; '' for the next record, also after a gap."""
-    if step == 0:
-        return "duplicate"
-    if step < LONGEST_GAP:
-        return ""
-    return "reordered" if _WORD - step <= REORDERED else "damaged"
+    return "reordered" if _WORD - step <= REORDERED else far
 
 
 SO_TIMESTAMPNS = 35

@@ -43,15 +43,15 @@ class LineRequests:
         self.descriptor, self._outlet, self._text = inlet, outlet, b""
         self.pauses: deque[tuple[int, int]] = deque(maxlen=KEPT)
         self._does: dict[str, Callable[[int, Request], object]] = {
-            "misbehave": self._misbehave, "set": self._set, "sag": self._sag,
-            "alert": lambda now, r: self._motor.shut_down(now, int(r["bits"])),
+            "misbehave": self._misbehave, "set": self._set,
+            "alert": lambda now, r: self._motor.shut_down(now, int(r["bits"])), "sag": self._sag,
             "vanish": lambda now, r: bus.vanish(), "appear": lambda now, r: bus.appear(r.get("name", "")),
             "ft_gap": lambda now, r: sensor.gap(int(r["records"])),
             "ft_restart": lambda now, r: sensor.restart(),
-            "ft_rate": lambda now, r: sensor.set_rate(float(r["rate"])),
+            "ft_rate": lambda now, r: sensor.set_rate(float(r["rate"])), "reverse": self._reverse,
             "ft_status": lambda now, r: setattr(sensor, "status", int(r.get("bits", SATURATED))),
-            "watch": lambda now, r: setattr(sensor, "keep", bool(r.get("on", True))),
-            "reverse": self._reverse, "model": self._model, "firmware": self._firmware, "log": self._log,
+            "model": self._model, "firmware": self._firmware,
+            "watch": lambda now, r: setattr(sensor, "keep", bool(r.get("on", True))), "log": self._log,
             "pauses": lambda now, r: [pause for pause in self.pauses if pause[0] >= int(r.get("since", 0))],
             "torque": lambda now, r: [self._motor.acting_goal(), bool(self._motor.get("torque_enable"))],
         }  # fmt: skip
