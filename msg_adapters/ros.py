@@ -49,11 +49,12 @@ def torque_command_message(stamp_ns: int, effort: float, joint: str = "joint") -
 
 def efforts_message(stamp_ns: int, efforts: Mapping[str, float]) -> JointState:
     """Return torques (N m) by name, as `torque_estimate` carries them."""
-    return _state(stamp_ns, list(efforts), effort=[float(effort) for effort in efforts.values()])
+    return state_message(stamp_ns, [*efforts], effort=[float(effort) for effort in efforts.values()])
 
 
-def _state(stamp_ns: int, names: list[str], frame: str = "", **values: list[float]) -> JointState:
-    message = JointState(name=names, **values)
+def state_message(stamp_ns: int, names: Sequence[str], frame: str = "", **values: list[float]) -> JointState:
+    """Return states of joints by name: position rad, velocity rad/s, effort N m, those that are given."""
+    message = JointState(name=list(names), **values)
     message.header.stamp = time_of(stamp_ns)
     message.header.frame_id = frame
     return message
@@ -64,18 +65,7 @@ def joint_state_message(
 ) -> JointState:
     """Return a state: rad, rad/s, N m."""
     values = {"position": [float(position)], "velocity": [float(velocity)], "effort": [float(effort)]}
-    return _state(stamp_ns, [joint], frame, **values)
-
-
-def joint_states_message(joints: Sequence[str]) -> JointState:
-    """Return a state of several joints, all at zero, without a stamp."""
-    zeros = [0.0] * len(joints)
-    return JointState(name=list(joints), position=zeros, velocity=zeros, effort=zeros)
-
-
-def deflection_message(stamp_ns: int, angle: float, joint: str = "joint", frame: str = "") -> JointState:
-    """Return an angle of the spring, rad, as `deflection` carries it."""
-    return _state(stamp_ns, [joint], frame, position=[float(angle)])
+    return state_message(stamp_ns, [joint], frame, **values)
 
 
 def wrench_message(stamp_ns: int, values: Sequence[float], frame: str = "ft_sensor") -> WrenchStamped:

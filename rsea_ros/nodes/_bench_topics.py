@@ -114,7 +114,7 @@ class BenchTopics:
             inferred: raw_writer(ros.wrench_message(0, (0.0,) * 6, frame=at), "wrench")
             for inferred, at in frames.items()
         }
-        angle = ros.deflection_message(0, 0.0, joint, frames[True])
+        angle = ros.state_message(0, [joint], frames[True], position=[0.0])
         self._deflection_writer = raw_writer(angle, "position")
         self._deflections = _publisher(node, ros.JointState, f"{within}deflection") if deflects else None
         kind = names.get(COMMAND_TYPE.name, JOINT_STATE)
@@ -198,7 +198,9 @@ class Combined:
     def __init__(self, node: Node, names: Sequence[str]) -> None:
         self._node = node
         self._publisher = _publisher(node, ros.JointState, "joint_states")
-        self._writer = raw_writer(ros.joint_states_message(names), "position", "velocity", "effort")
+        zeros = [0.0] * len(names)
+        states = ros.state_message(0, names, position=zeros, velocity=zeros, effort=zeros)
+        self._writer = raw_writer(states, "position", "velocity", "effort")
 
     def publish(self, states: Sequence[State | None], shift: int) -> None:
         """Publish the readings of a cycle under the first one's stamp; nothing where one is lost.

@@ -12,8 +12,8 @@ from msg_adapters.ros import (
     Clock,
     JointState,
     WrenchStamped,
-    deflection_message,
     stamp_of,
+    state_message,
     torque_command_message,
     wrench_message,
 )
@@ -117,7 +117,7 @@ def test_a_bag_has_the_deflection_and_only_a_sensors_torque(tmp_path, frame, kep
             stamp = START + k * 3_571_429
             for topic, message in (
                 ("torque_command", torque_command_message(stamp, 10.0 * angle)),
-                ("deflection", deflection_message(stamp, angle, frame=SPRING_FRAME.default)),
+                ("deflection", state_message(stamp, ["joint"], SPRING_FRAME.default, position=[angle])),
                 ("ft", wrench_message(stamp, (0.0,) * 5 + (1500.0 * angle,), frame=frame)),
             ):
                 bag.write(f"/rsea/{topic}", TYPES[topic], stamp, bytes(serialize_message(message)))
