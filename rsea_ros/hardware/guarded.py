@@ -231,7 +231,7 @@ class GuardedDevice:
             self.guard.limits = limits
 
     def cycle(self, wanted: float, age: float | None) -> State | None:
-        """Do a cycle of this device alone, see `together.cycle`."""
+        """Do a cycle of this device alone, see `cycle`."""
         return cycle([self], [(wanted, age)])[0]
 
     def measures_deflection(self) -> bool:
