@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 from rich.table import Table
 
-from rsea_ros.cli._options import RIG, add_json, add_results, print_file, provenance, results_place
-from rsea_ros.cli._terminal import progress
+from rsea_ros.cli import _options, _terminal
 from rsea_ros.design.motor_gear_units import catalogue
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.rig import Rig, motor_torque
@@ -29,15 +28,15 @@ SLOWEST, FASTEST = 50.0, 2000.0
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
-    add("rig", nargs="?", default=RIG, help="rig or model.yaml (default %(default)s)")
+    add("rig", nargs="?", default=_options.RIG, help="rig or model.yaml (default %(default)s)")
     free = "rig whose ends are the lightest load (default: the rig; the paper's pendulum if it is clamped)"
     add("--free", metavar="RIG", help=free)
     wide = "YAML of what to tolerate: spread, lag, mode (default: from the rig; docs/control.md)"
     add("--uncertainty", metavar="FILE", help=wide)
     rates = "rates of the control loop, Hz (default 280 1000)"
     add("--rate", type=float, nargs="+", default=[280.0, 1000.0], metavar="HZ", help=rates)
-    add_results(parser, f"{CONTROL_JSON} and {REPORT}", "out/control")
-    add_json(parser, CONTROL_JSON)
+    _options.add_results(parser, f"{CONTROL_JSON} and {REPORT}", "out/control")
+    _options.add_json(parser, CONTROL_JSON)
     parser.add_argument("--fail-on", choices=["missed"], help="exit status 1 if a trial misses its limit")
 
 
@@ -47,22 +46,22 @@ def run(args: argparse.Namespace) -> int:
     from rsea_ros.report import control as page
 
     inputs = [args.rig, args.free, args.uncertainty]
-    place = results_place(args, "out/control", (CONTROL_JSON, REPORT), inputs)
+    place = _options.results_place(args, "out/control", (CONTROL_JSON, REPORT), inputs)
     for rate in args.rate:
         if not SLOWEST <= rate <= FASTEST:
             raise ParameterError(f"--rate {rate:g} Hz, expected {SLOWEST:g} to {FASTEST:g} Hz")
     rig = load_rig(args.rig)
     file = args.uncertainty
     stated = [load_uncertainty(file, rig, rate) if file else None for rate in args.rate]
-    with progress("control") as report_progress:
+    with _terminal.progress("control") as report_progress:
         light = lightest(rig, args.free or "")
         result = study(rig, light, args.rate, motors(rig), progress=report_progress, sets=stated)
-    source = provenance("control", [], args.rig)
+    source = _options.provenance("control", [], args.rig)
     with NewFiles(place) as new:
         path = new.write(CONTROL_JSON, json_text(page.control_json(result)))
         report = new.write(REPORT, page.control_report(result, source))
     if args.json:
-        print_file(path)
+        _options.print_file(path)
     else:
         _print(result, report)
     missed = any(trial.met is False for at in result.rates for trial in at.trials)

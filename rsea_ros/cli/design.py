@@ -6,8 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from rsea_ros.cli import _options
-from rsea_ros.cli._terminal import say
+from rsea_ros.cli import _options, _terminal
 from rsea_ros.design.mechanism import UNITS, Requirement
 from rsea_ros.design.motor_gear_units import PAPERS, unit_named
 from rsea_ros.model.train import PARTS, TRAINS
@@ -93,23 +92,23 @@ def _print(asked: Any, least: Any, robust: Any, report: Path) -> None:
     from rsea_ros.design.spring_design import by_train
     from rsea_ros.report.design import verdict, whole
 
-    say(verdict(asked))
+    _terminal.say(verdict(asked))
     for check in asked.checks:
         value = "not possible" if math.isnan(check.value) else f"{check.value:.4g} {words.unit(check.unit)}"
         sign = ">=" if check.least else "<="
         limit = f"required {sign} {check.limit:.4g} {words.unit(check.unit)}"
-        say(f"  {'yes' if check.met else 'NO '}  {check.name}: {value}, {limit}", indent=7)
+        _terminal.say(f"  {'yes' if check.met else 'NO '}  {check.name}: {value}, {limit}", indent=7)
     rate = f"springs of {least.rate:.0f} N/m"
     if asked is least:
-        say(f"no softer spring meets them: {rate}")
+        _terminal.say(f"no softer spring meets them: {rate}")
     else:
         smallest = f"{whole(least.stiffness)} N·m/rad, {rate}"
-        say(f"smallest stiffness that meets all demands on the spring: {smallest}")
+        _terminal.say(f"smallest stiffness that meets all demands on the spring: {smallest}")
     if papers := unstated(asked):
-        say(f"not stated, so the paper's: {papers}", indent=2)
+        _terminal.say(f"not stated, so the paper's: {papers}", indent=2)
     for row in by_train(asked.requirement, asked.unit, asked.stiffness):
         (low, high), turned = row.band_range, row.design.unit
-        say(
+        _terminal.say(
             f"  {words.train(turned.train)}, n = {turned.turns:+.0f}: {row.design.band_exact:.4g} Hz "
             f"({low:.4g} to {high:.4g} Hz over 90 % of the rotor's inertia), {row.for_band:.0f} N·m/rad for "
             f"{asked.requirement.bandwidth:g} Hz, {row.least:.0f} N·m/rad for all demands",

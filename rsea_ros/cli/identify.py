@@ -9,7 +9,6 @@ from rich.console import Console
 
 from msg_adapters import read_record
 from rsea_ros.cli import _options, _terminal
-from rsea_ros.cli._terminal import progress, say
 from rsea_ros.cli.check import check_records
 from rsea_ros.identification.result import Identification, Verdict
 from rsea_ros.report.remark_words import fault_lines, remark_sentences, right_rig, split_off_rig
@@ -34,7 +33,7 @@ def run(args: argparse.Namespace) -> int:
     files = [*args.bags, *args.conditions]
     place = _options.results_place(args, default, IDENTIFICATION, [*files, args.rig])
     rig, topics = _options.rig_of(args), _options.topic_map(args)
-    with progress("identify") as tell:
+    with _terminal.progress("identify") as tell:
         tell("reading", 0.0)
         bags = _options.each_once(args.bags)
         records = [_options.cut(read_record([bag], topics=topics), args) for bag in bags]
@@ -55,16 +54,16 @@ def run(args: argparse.Namespace) -> int:
 def _print(result: Identification, report: Path) -> None:
     from rsea_ros.report import identification as words
 
-    say(words.verdict_sentence(result))
+    _terminal.say(words.verdict_sentence(result))
     if following := words.next_command(result):
         print(f"next: {following}")
     for line in fault_lines(result.faults):
-        say(f"data: {line}", indent=6)
+        _terminal.say(f"data: {line}", indent=6)
     Console(width=_terminal.width()).print(words.terminal_table(result, None))
     off, others = split_off_rig(result.remarks)
     sentences = [*remark_sentences(off), *([right_rig(str(report.parent / MODEL))] if off else [])]
     sentences += words.statics_sentences(result.statics) if result.statics else ()
     sentences += [*words.doubt_sentences(result), *remark_sentences([*others, *result.clocks])]
     for sentence in sentences:
-        say(sentence, indent=2)
+        _terminal.say(sentence, indent=2)
     print(f"report: {report}")

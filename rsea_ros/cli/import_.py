@@ -7,8 +7,7 @@ from shlex import quote
 
 from msg_adapters import write_record
 from msg_adapters.tables import Imported, ImportMap, guess_map, import_records, load_map, summary
-from rsea_ros.cli._options import add_force, add_topic_options, topic_map
-from rsea_ros.cli._terminal import say, whole_numbers
+from rsea_ros.cli import _options, _terminal
 from rsea_ros.cli.maps import map_path
 from rsea_ros.errors import OutputError, ParameterError
 from rsea_ros.outputs.files import Destination, NewFiles, check_free, write_file
@@ -34,11 +33,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "numbers of the joints in the place of # in the map's columns (q[#], from 0; J# torque): 2, "
         "or 0,1,2, or 0-5"
     )
-    parser.add_argument("--index", type=whole_numbers, default=(None,), metavar="N", help=which)
-    add_force(parser)
+    parser.add_argument("--index", type=_terminal.whole_numbers, default=(None,), metavar="N", help=which)
+    _options.add_force(parser)
     storage = "format of a bag that is a directory (default mcap)"
     parser.add_argument("--storage", default="mcap", choices=("mcap", "sqlite3"), help=storage)
-    add_topic_options(parser)
+    _options.add_topic_options(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -51,12 +50,12 @@ def run(args: argparse.Namespace) -> int:
     mapping = load_map(path)
     if len(args.files) == len(args.index) == 1 and mapping.runs is None:
         (imported,) = import_records(args.files[0], mapping, args.index)
-        write_record(imported.record, args.out, topic_map(args), args.storage, force=args.force)
+        write_record(imported.record, args.out, _options.topic_map(args), args.storage, force=args.force)
         lines = list(_lines_on(imported, args.out))
     else:
         lines = _write_several(args, mapping)
     for line in lines:
-        say(line, indent=2)
+        _terminal.say(line, indent=2)
     return 0
 
 
@@ -66,7 +65,7 @@ def _guess(files: list[str], path: Path, force: bool) -> int:
     check_free([path], force=force, inputs=files)
     text = guess_map(files[0])
     write_file(path, text, force=force)
-    say(f"{path}: a ? where the file says nothing, {text.count('?') - 1} times")
+    _terminal.say(f"{path}: a ? where the file says nothing, {text.count('?') - 1} times")
     print(f"next: rsea import {quote(files[0])} --map {quote(str(path))} --out {quote(Path(files[0]).stem)}")
     return 0
 
@@ -84,7 +83,7 @@ def _write_several(args: argparse.Namespace, mapping: ImportMap) -> list[str]:
                 if name in names:
                     raise OutputError(f"{folder / name}: is the bag of two inputs, expected other file names")
                 names.add(name)
-                write_record(imported.record, new.stage(name), topic_map(args), args.storage)
+                write_record(imported.record, new.stage(name), _options.topic_map(args), args.storage)
                 lines += _lines_on(imported, folder / name)
     return lines
 

@@ -4,8 +4,7 @@ import argparse
 from dataclasses import replace
 from pathlib import Path
 
-from rsea_ros.cli import _options
-from rsea_ros.cli._terminal import progress, say
+from rsea_ros.cli import _options, _terminal
 from rsea_ros.cli.check import check_records
 from rsea_ros.cli.diagnose import readable
 from rsea_ros.model.rig_file import load_rig
@@ -29,7 +28,7 @@ def run(args: argparse.Namespace) -> int:
     default = Path("out") / f"law-{Path(args.bags[0]).stem}"
     place = _options.results_place(args, default, LAW, [*args.bags, args.rig])
     rig, topics = load_rig(args.rig), _options.topic_map(args)
-    with progress("law") as tell:
+    with _terminal.progress("law") as tell:
         tell("reading", 0.0)
         records = [readable(bag, topics, args) for bag in _options.each_once(args.bags)]
         records = check_records(records, rig, topics.axis, quiet=args.json, masks=True)
@@ -45,12 +44,12 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         _options.print_file(report.parent / LAW_JSON)
     else:
-        say(page.headline(result))
+        _terminal.say(page.headline(result))
         print(f"rig         {rig_named(result.rig_name, result.rig_choice)}")
         for line in page.law_lines(result):
-            say(f"  {line}", indent=6)
+            _terminal.say(f"  {line}", indent=6)
         if result.laws:
-            say(page.gain_sentence(result), indent=2)
+            _terminal.say(page.gain_sentence(result), indent=2)
             print(f"effect      {', '.join(str(report.parent / (w.law.name + '.py')) for w in result.laws)}")
         print(f"report      {report}")
     finding = "law" if result.laws else "at_noise_floor" if result.at_floor else "no_law"
