@@ -68,7 +68,6 @@ class Declarations:
 @dataclass
 class McapSummary(Declarations):
     """counts: messages by channel. total: of all channels. chunks: first byte of each, rising.
-
     damage: why it cannot be trusted, empty where it can.
     """
 

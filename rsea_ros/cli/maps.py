@@ -1,7 +1,4 @@
-"""`rsea maps`: the import maps that come with the package.
-
-Import maps by name: those in config/imports, beside the rigs.
-"""
+"""`rsea maps`: the import maps that come with the package, those in config/imports."""
 
 import argparse
 from pathlib import Path

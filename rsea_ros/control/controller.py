@@ -133,7 +133,6 @@ class TorqueController:
         settings: ControllerSettings | None = None,
     ) -> None:
         """rate: Hz. gains: by default those of `synthesis.design`, which takes 2 to 3 s.
-
         link: share of the motion in `Measurement.link` that is fed forward (link.link_share), by default
         nothing. Raises ParameterError for a rig whose torque cannot be controlled.
         """

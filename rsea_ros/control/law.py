@@ -45,7 +45,6 @@ MOST = 0.2
 @dataclass(frozen=True)
 class Gains:
     """k_p, k_i: 1. k_d: s, so that k_d K_s is a damping in N m s/rad. q_frequency: of Q, Hz.
-
     k_w: N m s/rad.
     """
 

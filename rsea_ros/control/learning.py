@@ -172,7 +172,6 @@ class Learning:
         """Process a sample: N m, rad/s; torque: N m, mean of the command over the hold that it ends.
 
         acted: N m, mean of the measured torque over that hold.
-
         gap: rad/s, the part of that velocity that crosses backlash and is not the load's. sure: whether that
         is surely the torque that acted; else nothing is learned from it.
         """

@@ -107,7 +107,6 @@ _mean_tanh: Callable[[float, float, float], tuple[float, float]] = mean_tanh.py_
 
 class Reference:
     """now, next: the outputs of `Sampled` of the model at this sample and at the next one, shape (4,).
-
     promised: the desired torques (N m) that the model was steered to at these two. turning: the speed that
     the gear should have at this sample with its load, rad/s.
     """

@@ -73,7 +73,6 @@ POINTS = 4000
 @dataclass(frozen=True)
 class Reach:
     """amplitude: N m.
-
     torque, speed: Hz, from which it needs more of either than the motor has; inf: never.
     """
 

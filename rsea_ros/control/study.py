@@ -291,7 +291,6 @@ class AtRate:
 @dataclass(frozen=True)
 class Study:
     """rig: both ends clamped; free: the same actuator with the lightest load.
-
     resonance: of the open loop, Hz.
     reaches: by motor, for the clamped and for the free rig, at each of AMPLITUDES.
     """

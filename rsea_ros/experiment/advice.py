@@ -193,7 +193,6 @@ class Proof:
 @dataclass(frozen=True)
 class Advice:
     """proposal: the run, None where no run decides anything. proofs: of the pairs that none separates.
-
     excluded: causes that the records contradict, with their probability.
     """
 

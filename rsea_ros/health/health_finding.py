@@ -184,7 +184,6 @@ NAMES = tuple(code.name for code in TABLE)
 @dataclass(frozen=True)
 class WatchSettings:
     """rate: false alarms an hour. every: s between looks. learn: looks that show how the innovations scatter.
-
     fitted: looks that a cause is fitted to. hold: s, how long a command stays in force.
     """
 

@@ -91,7 +91,6 @@ LEAST = 0.15
 @dataclass(frozen=True)
 class Scatter:
     """scale: standard deviation of the innovations by channel, (3,). phi: dispersion of the scores, (p,).
-
     level, spread: mean and standard deviation of the logarithm of a look's mean square by channel, (3,).
     """
 

@@ -88,13 +88,9 @@ class BenchTopics:
         part: str = "", deflects: bool = False,
     ) -> None:  # fmt: skip
         """names: values of NAMES, and of SPRING_FRAME, COMMAND_TYPE and torque_limit where they may be.
-
         strict: see CommandQueue; then one publisher is obeyed at a time.
-
         every_record: ft gets all records since the last reading, not one.
-
         part: name of a bench among others of the same node; its topics are under it.
-
         deflects: whether readings have the spring's deflection, which then has a topic.
         """
         within = f"{part}/" if part else ""

@@ -35,7 +35,6 @@ Work = Callable[[int], str]
 
 class DrivenJoint:
     """values: parameters of this joint.
-
     part: its name among others, the namespace of its topics and services.
     jobs: threads of services. offers: the services of the node, to which those of this joint are added.
     drive, topics: present while the device is open.

@@ -123,7 +123,6 @@ class StoppedSensors:
 
     def __init__(self, noise: Noise, stiffness: float = 0.0, *, ft_repeats: bool = False) -> None:
         """stiffness: of the spring, N m/rad.
-
         ft_repeats: whether ft may repeat a value at rest because its quantum exceeds its noise, as that of an
         encoder does.
         """

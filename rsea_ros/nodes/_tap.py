@@ -60,7 +60,6 @@ class Mailbox:
         admit: Callable[[object], bool] | None = None, keep: Callable[[int, bytes], None] | None = None,
     ) -> None:  # fmt: skip
         """refuse: called for each message that cannot be read.
-
         admit: decides by a publisher's identity whether a message counts that can be read; None: all do.
         keep: gets arrival (ns), bytes of what is read.
         """

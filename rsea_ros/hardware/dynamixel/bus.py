@@ -242,7 +242,6 @@ class Bus:
     """One motor, or another device, on a port.
 
     alert: bit 7 of the last error byte. errors: failed transactions by kind.
-
     latency, return_delay: see SerialPort; of this motor's transactions, also where others use the port.
     """
 

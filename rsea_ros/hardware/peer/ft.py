@@ -18,7 +18,6 @@ HEAD, EQUAL = 9, 14
 @dataclass
 class Misbehaviour:
     """drop, delay, corrupt, truncate, wrong_crc: shares of the motor's replies. late: of the delay, s.
-
     unstuffed, silent: whether. twin: whether a second motor of the same ID answers at the same time, with
     other measurements; a line that two drive is low where either is. ft_drop: share of the sensor's records;
     ft_silent: whether it sends none; ft_stuck: whether they repeat one value, while the counters go on.
