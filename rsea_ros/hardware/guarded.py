@@ -424,7 +424,7 @@ class GuardedDevice:
         """Where the wrench of the newest reading comes from, in words."""
         if self.state is None or self.state.wrench is None:
             return "none"
-        return f"{self._spring}" if self.state.inferred else "sensor"
+        return f"{self._spring}" if self.state.inferred and self._spring else "sensor"
 
     def _read(self) -> State:
         """Return a reading, with the spring's torque where only the deflection is measured."""
