@@ -6,7 +6,6 @@ and services are listed. `operator` stands for a person, who may listen to every
 publish nothing.
 """
 
-import importlib
 import os
 import sys
 import tempfile
@@ -22,10 +21,9 @@ from msg_adapters import BagWriter
 from rsea_ros.model.rig import Sensor
 from rsea_ros.model.rig_file import load_rig, save_rig
 from rsea_ros.nodes._run import NAMESPACE, Member
+from rsea_ros.nodes.joint import KINDS, component
 from rsea_ros.nodes.record import TOPICS
-from rsea_ros.plugins import node_modules
 
-NODES = {name: module for name, module in node_modules().items() if name != "joint"}
 ENCODERS = "two_encoders.yaml"
 """A rig with an encoder on the spring whose torque can be controlled."""
 PARAMETERS: Mapping[str, Mapping[str, object]] = {
@@ -63,7 +61,7 @@ def policies(joints: Sequence[str] = ()) -> str:
                     bag.write(name if name.startswith("/") else f"/{NAMESPACE}/{name}", kind, 1, bytes(8))
             rig = load_rig("paper_high_impedance")
             save_rig(replace(rig, sensors={**rig.sensors, "deflection": Sensor(noise=1e-6)}), ENCODERS)
-            nodes = _joints(joints) if joints else {(NAMESPACE, name): interfaces(name) for name in NODES}
+            nodes = _joints(joints) if joints else {(NAMESPACE, name): interfaces(name) for name in KINDS}
         finally:
             os.chdir(before)
     heard = {name for each in nodes.values() for name in each["topics", "publish"]}
@@ -93,11 +91,10 @@ def _joints(joints: Sequence[str]) -> Profiles:
 
 def interfaces(name: str, **parameters: object) -> Interfaces:
     """Make a node and return the full names of its topics and services."""
-    component = importlib.import_module(NODES[name]).NODE
     given = {**PARAMETERS.get(name, {}), **parameters}
     words = [w for key, value in given.items() for w in ("-p", f"{key}:={value}")]
     with rclpy.init(args=["--ros-args", *words]):
-        member = Member(component, SingleThreadedExecutor())
+        member = Member(component(name), SingleThreadedExecutor())
         try:
             return _ask(member.node, name)
         finally:

@@ -21,14 +21,15 @@ from rsea_ros.nodes._run import BAD_INPUT, NAMESPACE, TICK, Component, Member, o
 from rsea_ros.plugins import node_modules
 
 USUAL = ("driver", "controller", "model")
+KINDS = {name: module for name, module in node_modules().items() if name != "joint"}
+"""By name of its executable: the module of each other node."""
 
 
 def component(kind: str) -> Component:
     """Return a kind of node by the name of its executable. Raises ParameterError where there is none."""
-    kinds = {name: module for name, module in node_modules().items() if name != "joint"}
-    if kind not in kinds:
-        raise ParameterError(f"node {kind!r}, expected one of {', '.join(kinds)}{did_you_mean(kind, kinds)}")
-    found: Component = importlib.import_module(kinds[kind]).NODE
+    if kind not in KINDS:
+        raise ParameterError(f"node {kind!r}, expected one of {', '.join(KINDS)}{did_you_mean(kind, KINDS)}")
+    found: Component = importlib.import_module(KINDS[kind]).NODE
     return found
 
 

@@ -25,12 +25,8 @@ TABLE = (
     NodeParameter("rate", 1.0, "pace: 2 is twice as fast as recorded", "", 0.01, 1000.0),
     NodeParameter("start", 0.0, "begin so far into the bag", "s", 0.0, 1e6),
     NodeParameter(
-        "subscribers",
-        1,
-        "subscriptions of each of the three topics to wait for; 0: begin at once",
-        "",
-        0,
-        100,
+        "subscribers", 1, "subscriptions of each of the three topics to wait for; 0: begin at once",
+        "", 0, 100,
     ),
     NodeParameter("clock", True, "whether to publish /clock"),
 )

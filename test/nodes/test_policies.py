@@ -35,7 +35,7 @@ def test_the_committed_policies_are_those_of_the_nodes(tmp_path):
 )
 def test_only_listed_nodes_may_move_the_machine(plural, verb, name, allowed):
     profiles = {p.get("node"): p for p in XML.parse(FILE).iter("profile")}
-    assert set(profiles) == {*_policies.NODES, _policies.OPERATOR}
+    assert set(profiles) == {*_policies.KINDS, _policies.OPERATOR}
 
     def topics_of(profile):
         return [e.text for e in profile.iterfind(f"{plural}[@{verb}='ALLOW']/*")]
