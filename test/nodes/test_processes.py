@@ -16,12 +16,12 @@ from std_msgs.msg import Empty
 
 from bench.processes import may_have
 from rsea_ros import processes
-from rsea_ros.nodes._policies import NODES
 from rsea_ros.nodes._waiter import Pulse, anything_to_do
+from rsea_ros.nodes.joint import KINDS
 from test.nodes.conftest import Process
 
 
-@pytest.mark.parametrize(("name", "module"), NODES.items())
+@pytest.mark.parametrize(("name", "module"), KINDS.items())
 def test_a_node_is_a_program(name, module, monkeypatch, capsys):
     monkeypatch.setattr(sys, "argv", [name, "--help"])
     with warnings.catch_warnings(), pytest.raises(SystemExit) as left:
