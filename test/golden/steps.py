@@ -29,7 +29,7 @@ from rsea_ros.laws import terms
 from rsea_ros.laws.effect_source import LawProvenance, source_of
 from rsea_ros.laws.law import FittedTerm, Law, LearntCurve
 from rsea_ros.model.rig_file import packaged_names, rig_text
-from rsea_ros.nodes._policies import NODES
+from rsea_ros.nodes.joint import KINDS
 
 RIG = "paper_high_impedance"
 PLAY = ("backlash", "hard_stop", "ft_sensor_lag", "coulomb_friction")
@@ -255,7 +255,7 @@ def helps(folder: Path) -> Iterator[str]:
 
 def nodes(folder: Path) -> Iterator[str]:
     """Yield what every node prints with --help: its parameters with their ranges and defaults."""
-    for name, module in NODES.items():
+    for name, module in KINDS.items():
         node = importlib.import_module(module)
         sys.argv = [name, "--help"]
         with redirect_stdout(StringIO()) as out:
