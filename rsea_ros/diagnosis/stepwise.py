@@ -195,12 +195,12 @@ def select_stepwise(
     """
     setup = FitSetup(nominal.cases, settings, pools.run)
     models = [_fit_nominal(nominal, setup, start)]
-    known = start.effects if start else ()
-    for cause in (e for e in known if e.name not in nominal.acting):
-        effect = next(e for e in effects if e.name == cause.name)
-        problem, _ = add_effect(models[-1].problem, models[-1].solution.theta, effect, dict(cause.parameters))
-        model = fit_candidate(setup, problem, vector_of(problem.unknowns, start))
-        models.append(refit(with_noise_reestimated(model), setup))
+    for cause in start.effects if start else ():
+        if start and cause.name not in nominal.acting:
+            last, effect = models[-1], next(e for e in effects if e.name == cause.name)
+            problem, _ = add_effect(last.problem, last.solution.theta, effect, dict(cause.parameters))
+            model = fit_candidate(setup, problem, vector_of(problem.unknowns, start))
+            models.append(refit(with_noise_reestimated(model), setup))
     cases = models[-1].cases
     selection = Selection((*(rescore(m, cases) for m in models[:-1]), models[-1]))
     return go_on(selection, effects, pools, tell, settings)

@@ -248,68 +248,6 @@ class Rig:
     """
 
     name: str
-    parameters: Mapping[str, float]
-    guess: bool = False
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "parameters", MappingProxyType(dict(self.parameters)))
-
-
-@dataclass(frozen=True)
-class Condition:
-    """What differs in one record of a machine, known by the last part of its path.
-
-    values: replace the rig's; a fit moves those with a spread, for this record alone. added: to the rig's
-    value or what a fit makes of it, SI: a payload. without: names of effects that do not act in it.
-    """
-
-    record: str
-    values: Mapping[str, Quantity] = field(default_factory=dict)
-    added: Mapping[str, float] = field(default_factory=dict)
-    without: frozenset[str] = frozenset()
-
-    def moved(self, values: Mapping[str, float]) -> Condition:
-        """Return the condition with some of its values replaced (SI, by names as `spring.damping@cold`)."""
-        moved = {n: values.get(f"{n}@{self.record}", q.value) for n, q in self.values.items()}
-        return replace(self, values={n: replace(q, value=moved[n]) for n, q in self.values.items()})
-
-
-def field_of(name: str) -> str:
-    """Return the field of a value, `spring.damping` of `spring.damping@cold` too: of that record alone."""
-    return name.partition("@")[0]
-
-
-@dataclass(frozen=True)
-class PositionLoop:
-    """Position loop that was active during the record: command = k_v (k_p (reference - q) - dq/dt).
-
-    k_p: 1/s; k_v: N m s/rad; limit: N m on the command.
-    """
-
-    k_p: float
-    k_v: float
-    limit: float = math.inf
-
-
-@dataclass(frozen=True)
-class Rig:
-    """A description of a bench. See the module docstring.
-
-    linear: linear motion; m, N and kg replace rad, N m and kg m^2. other_trains: other possible gear
-    trains. beside_spring: which part turns the spring (train.py); position and motor torque are those of
-    that part against the other, chassis.inertia is its. known: names that no fit may change. proximal: the
-    end that the paper calls *proximal*. ft_end: the end with the F/T sensor; at the housing end it measures
-    the proximal spring, between housing and that end. encoder_end: the part that the encoder measures
-    against the housing: the gear output, or the spring end behind backlash and spring. motion: `measured`
-    where something else moves the output, as empty for a rigid joint without a loop: then torques are judged
-    along the measured motion (model/inverse.py); else it is `simulated`. loop: kind of the position loop whose targets command the bench, a key of
-    LOOP_FIELDS; its gains are among the quantities. controller: a loop that added its torque to the command
-    of the record. hold: the command between two samples: the first of them, a line between them, or the
-    band-limited curve of an analogue command sampled behind a filter. conditions: what differs in some
-    records.
-    """
-
-    name: str
     quantities: Mapping[str, Quantity]
     clamped: frozenset[str] = frozenset()
     rigid_spring: bool = False
@@ -475,7 +413,8 @@ def check_structure(rig: Rig) -> None:
         ("gear.train", rig.train, TRAINS), *(("gear.or", train, TRAINS) for train in rig.other_trains),
         ("proximal", rig.proximal, END_NAMES), ("ft_end", rig.ft_end, END_NAMES),
         ("encoder_end", rig.encoder_end, ("gear_output", "spring_end")),
-        ("motion", rig.motion, ("", "simulated", "measured")), ("beside_spring", rig.beside_spring, PARTS),
+        ("motion", rig.motion or "simulated", ("simulated", "measured")),
+        ("beside_spring", rig.beside_spring, PARTS),
     ):  # fmt: skip
         if value not in allowed:
             raise RigError(f"rig {rig.name}: {key} = {value!r}, expected one of {', '.join(allowed)}", key)
