@@ -23,7 +23,7 @@ USE = (
     "A torque of the motor at the gear output, N·m, positive where it drives the output forward against the",
     "housing: to be added to that of your controller. It holds no state and has no acceleration in it.",
     "position, velocity: of the gear output against the housing, rad, rad/s; desired speeds have no noise.",
-    "load: torque in the spring, or of a rigid joint on its link; motor: your command, N·m. Both only for",
+    "load: torque in the spring, or of a rigid joint its weight; motor: your command, N·m. Both only for",
     "friction that depends on them. What is not finite gives 0. A linear rig has m and N for rad and N·m.",
 )
 _SIGN = " * tanh(velocity / {creep_velocity})"

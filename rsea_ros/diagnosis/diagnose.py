@@ -23,13 +23,14 @@ from rsea_ros.effects.effect import Effect
 from rsea_ros.errors import IdentificationError
 from rsea_ros.identification.confidence import stated_differences, torque_scale
 from rsea_ros.identification.fit import as_recorded, unknowns_of, with_even_clocks
-from rsea_ros.identification.identify import lost_behind
+from rsea_ros.identification.identify import identify, lost_behind
 from rsea_ros.identification.problem import Problem, case_from
 from rsea_ros.identification.result import Remark
 from rsea_ros.identification.solver import Map, Pools, serial, worker_pools
 from rsea_ros.identification.start import joint_start, scale_of, settled_starts
 from rsea_ros.identification.unknowns import start_vector
 from rsea_ros.model.extent import bound_values
+from rsea_ros.model.inverse import is_inverse
 from rsea_ros.model.position_loop import with_command
 from rsea_ros.model.rig import Rig
 from rsea_ros.progress import Progress
@@ -62,6 +63,18 @@ def diagnose(
     for record in [*records, *([holdout] if holdout is not None else [])]:
         check_diagnosable(record)
     rig, unseen = as_recorded(rig, records)
+    result = _diagnosed(records, rig, holdout, tell, settings)
+    if not result.at_noise_floor and (start := _held(records, rig, result)) is not None:
+        simulated = _diagnosed(records, replace(rig, motion="simulated"), holdout, tell, settings, start)
+        result = min(result, simulated, key=_over_noise)
+    return replace(result, remarks=(*unseen, *result.remarks))
+
+
+def _diagnosed(
+    records: Sequence[Record], rig: Rig, holdout: Record | None, tell: Progress, settings: DiagnosisSettings,
+    start: Rig | None = None,
+) -> Diagnosis:
+    """Diagnose a rig as it is judged. start: a rig whose values the first fit begins with."""
     checked, remarks = _steady([check(r, rig) for r in records], rig)
     tested = _steady([check(holdout, rig)], rig)[0][0] if holdout is not None else None
     examined = Examined(records, checked, tested, rig)
@@ -71,14 +84,39 @@ def diagnose(
             _check_testable(tested, nominal)
         tell("choosing stretches", 0.0)
         used = in_stretches(nominal, settings, pools.run)
-        selection, stages = search(used, checked[0].record, tested, pools, tell, settings)
+        selection, stages = search(used, checked[0].record, tested, pools, tell, settings, start)
         tell("weighing the causes", 0.97)
         result = conclude(selection, stages, examined, pools, settings)
     cut = stretches_of(used, nominal, settings)
     lost = 0 if result.verdict == "nothing_wrong" else lost_behind(result.faults, result.before)
     likely = (Remark("lost_cycles", values=(float(lost),)),) if lost else ()
     known = (*torque_scale(nominal), *stated_differences(nominal))
-    return replace(result, remarks=(*unseen, *likely, *remarks, *cut, *known, *result.remarks))
+    return replace(result, remarks=(*likely, *remarks, *cut, *known, *result.remarks))
+
+
+_FOLLOWS = 90.0
+"""Percent of fit to the position from which a simulation follows a motion well enough to be searched."""
+
+
+def _held(records: Sequence[Record], rig: Rig, result: Diagnosis) -> Rig | None:
+    """Return what was found along the motion of a rigid joint, where a simulation of it follows the motion.
+
+    A weight or a spring holds the joint then. The filter of a measured motion smears each reversal, and the
+    law of a friction with it; a simulation doesn't.
+    """
+    is_held = rig["spring_end.gravity"] > 0.0 or rig["spring_end.stiffness"] > 0.0
+    if rig.motion or not (is_held and is_inverse(rig)):
+        return None
+    try:
+        found = identify(records, replace(result.extended_rig, motion="simulated"), of_misfit=False)
+    except IdentificationError:  # the motor's torque is known, its command is not
+        return None
+    return found.rig if found.fit_percent["position"] > _FOLLOWS else None
+
+
+def _over_noise(result: Diagnosis) -> float:
+    """Return the largest of what a diagnosis leaves of its channels over their noise."""
+    return max(result.extended_residual_rms[name] / noise for name, noise in result.noise_rms.items())
 
 
 def nominal_problem(
@@ -109,15 +147,16 @@ def search(
     pools: Pools,
     tell: Progress,
     settings: DiagnosisSettings,
+    start: Rig | None = None,
 ) -> tuple[Selection, list[Evaluated]]:
     """Select causes beside the nominal model and evaluate every model of the selection.
 
-    record: the first one, which gives a joint in its loop its start.
+    record: the first one, which gives a joint in its loop its start, where `start` is no other.
     """
     rig = nominal.rig
     effects = searched_effects(nominal, settings.without)
     is_plain = rig.loop is not None and rig.condition(record.source) is None
-    start = joint_start(record, rig) if is_plain else None
+    start = start or (joint_start(record, rig) if is_plain else None)
     selection = select_stepwise(nominal, effects, pools, tell, settings, start)
     tell("looking for a simpler model", 0.9)
     selection = settled(selection, effects, pools, tell, settings)

@@ -34,6 +34,7 @@ from rsea_ros.diagnosis.step_fits import ScreenedEffect, StepFits
 from rsea_ros.effects.catalogue import look_alikes
 from rsea_ros.effects.effect import Effect
 from rsea_ros.identification.confidence import is_off_rig
+from rsea_ros.identification.fit import add_effect
 from rsea_ros.identification.problem import Problem
 from rsea_ros.identification.solver import Pools, Solution
 from rsea_ros.identification.unknowns import LOOP_CLOCK, theta_with, vector_of
@@ -190,10 +191,19 @@ def select_stepwise(
 ) -> Selection:  # fmt: skip
     """Select up to max_causes causes among some effects, the one that explains most first.
 
-    start: a rig whose values the first fit begins with.
+    start: a rig whose values the first fits begin with, and whose effects are the first causes.
     """
-    fitted = _fit_nominal(nominal, FitSetup(nominal.cases, settings, pools.run), start)
-    return go_on(Selection((fitted,)), effects, pools, tell, settings)
+    setup = FitSetup(nominal.cases, settings, pools.run)
+    models = [_fit_nominal(nominal, setup, start)]
+    for cause in start.effects if start else ():
+        if start and cause.name not in nominal.acting:
+            last, effect = models[-1], next(e for e in effects if e.name == cause.name)
+            problem, _ = add_effect(last.problem, last.solution.theta, effect, dict(cause.parameters))
+            model = fit_candidate(setup, problem, vector_of(problem.unknowns, start))
+            models.append(refit(with_noise_reestimated(model), setup))
+    cases = models[-1].cases
+    selection = Selection((*(rescore(m, cases) for m in models[:-1]), models[-1]))
+    return go_on(selection, effects, pools, tell, settings)
 
 
 def go_on(

@@ -5,9 +5,10 @@ better than they are driven.
     smooth below creep_velocity
 
 The quadratic part acts where motor and spring work against each other (T_m · T_s > 0). T_m is the motor's
-torque, T_s that in the spring, ω the speed of the gear output against the housing; the sign is smoothed below
-creep_velocity (presliding), see _friction.py. Source: Duclusaud, Passault, Padois, Ly, Extended friction
-models for the physics simulation of servo actuators, 2024, models M5 and M6 (their Stribeck factor apart).
+torque, T_s that in the spring, or of a rigid joint its weight and what it stands against, ω the speed of the
+gear output against the housing; the sign is smoothed below creep_velocity (presliding), see _friction.py.
+Source: Duclusaud, Passault, Padois, Ly, Extended friction models for the physics simulation of servo
+actuators, 2024, models M5 and M6 (their Stribeck factor apart).
 """
 
 from rsea_ros.effects._friction import PRESLIDING, mean_friction

@@ -2,9 +2,9 @@
 
     T = -coefficient · |T_s| · sign(ω), smooth below creep_velocity
 
-T_s is the torque in the spring, ω the speed of the gear output against the housing; the sign is smoothed
-below creep_velocity (presliding), see _friction.py. Source: the motor's data sheet (no-load drag is a
-fraction of the paper's b_m).
+T_s is the torque in the spring, or of a rigid joint its weight and what it stands against, ω the speed of the
+gear output against the housing; the sign is smoothed below creep_velocity (presliding), see _friction.py.
+Source: the motor's data sheet (no-load drag is a fraction of the paper's b_m).
 """
 
 from rsea_ros.effects._friction import PRESLIDING, mean_friction

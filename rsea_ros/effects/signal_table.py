@@ -46,7 +46,7 @@ COMMIT = 3  # 1 when the step is done: only then may a SPRING effect change its 
 COMMAND = 4  # N m, held over the step
 CURRENT = 5  # N m, motor torque that the measured current shows at the end of the step
 REFERENCE = 6  # rad, target of a controller in the loop
-K_S = 7  # N m/rad
+K_S = 7  # N m/rad; 0 of a rigid joint
 B_S = 8  # N m s/rad
 B_M = 9  # N m s/rad
 
@@ -65,7 +65,7 @@ DISTAL_ANGLE = 21  # rad, absolute
 DISTAL_VELOCITY = 22  # rad/s
 FIRST_READ, LAST_READ = ROTOR_ANGLE, DISTAL_VELOCITY
 
-LOAD = 23  # N m, torque in the spring, effects included
+LOAD = 23  # N m, torque in the spring, effects included; of a rigid joint what holds it from outside
 
 GEAR_TORQUE = 24  # N m, on the gear output, against the housing
 SPRING_TORQUE = 25  # N m, in the spring beside K_s d + b_s d'

@@ -117,7 +117,8 @@ _TORQUE_TRUST = 0.01
 
 def is_inverse(rig: Rig) -> bool:
     """Return whether a rig is compared by torque: nothing that it has holds it, so that it drifts."""
-    return (rig.rigid_spring or rig.motion == "measured") and rig.loop is None
+    drifts = rig.rigid_spring and rig.motion != "simulated"
+    return (drifts or rig.motion == "measured") and rig.loop is None
 
 
 def spring_mode(rig: Rig) -> float:
@@ -135,7 +136,7 @@ def as_seen(rig: Rig, records: Sequence[Record]) -> tuple[Rig, tuple[float, ...]
     and load turn as one; a simulation from commands alone would run away, the torque along the motion tells.
     """
     drifts = rig.clamped == frozenset({"housing_end"}) and not rig["spring_end.stiffness"]
-    is_plain = not rig.rigid_spring and rig.loop is None and rig.motion == "simulated" and not rig.conditions
+    is_plain = not rig.rigid_spring and rig.loop is None and not rig.motion and not rig.conditions
     is_blind = all("position" in r and not {"deflection", "ft"} & r.channels.keys() for r in records)
     if not (drifts and is_plain and is_blind):
         return rig, ()
@@ -386,10 +387,7 @@ def torques_along(rig: Rig, motion: Motion) -> dict[str, FloatArray]:
         return _beside_spring(rig_as_is, m, machine, motion, period)
     gravity = rig_as_is["spring_end.gravity"] * np.sin(motion.q + rig_as_is["spring_end.gravity_angle"])
     linear = m.mass[0, 0] * motion.a + m.damping[0, 0] * motion.v + m.stiffness[0, 0] * motion.q
-    load = gravity + sum(
-        rig_as_is[f"spring_end.{name}"] * values
-        for name, values in (("inertia", motion.a), ("damping", motion.v), ("stiffness", motion.q))
-    )
+    load = gravity + rig_as_is["spring_end.damping"] * motion.v + rig_as_is["spring_end.stiffness"] * motion.q
     nothing = np.zeros(len(motion.t))
     needed = _needed(machine, motion, linear, gravity, load, nothing, nothing, period)[0]
     return {"motor_torque": motion.compared(needed + _lost_of_command(rig, machine, motion))}

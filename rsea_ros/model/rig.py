@@ -239,12 +239,12 @@ class Rig:
     end that the paper calls *proximal*. ft_end: the end with the F/T sensor; at the housing end it measures
     the proximal spring, between housing and that end. encoder_end: the part that the encoder measures
     against the housing: the gear output, or the spring end behind backlash and spring. motion: `measured`
-    where something else moves the output: then torques are judged along the measured motion
-    (model/inverse.py). loop: kind of the position loop whose targets command the bench, a key of
-    LOOP_FIELDS; its gains are among the quantities. controller: a loop that added its torque to the command
-    of the record. hold: the command between two samples: the first of them, a line between them, or the
-    band-limited curve of an analogue command sampled behind a filter. conditions: what differs in some
-    records.
+    where something else moves the output, and where it is empty for a rigid joint without a loop: then
+    torques are judged along the measured motion (model/inverse.py); else `simulated`. loop: kind of the
+    position loop whose targets command the bench, a key of LOOP_FIELDS; its gains are among the quantities.
+    controller: a loop that added its torque to the command of the record. hold: the command between two
+    samples: the first of them, a line between them, or the band-limited curve of an analogue command sampled
+    behind a filter. conditions: what differs in some records.
     """
 
     name: str
@@ -260,7 +260,7 @@ class Rig:
     proximal: str = "housing_end"
     ft_end: str = "spring_end"
     encoder_end: str = "gear_output"
-    motion: str = "simulated"
+    motion: str = ""
     loop: str | None = None
     controller: PositionLoop | None = None
     hold: Hold = "zero"
@@ -413,7 +413,8 @@ def check_structure(rig: Rig) -> None:
         ("gear.train", rig.train, TRAINS), *(("gear.or", train, TRAINS) for train in rig.other_trains),
         ("proximal", rig.proximal, END_NAMES), ("ft_end", rig.ft_end, END_NAMES),
         ("encoder_end", rig.encoder_end, ("gear_output", "spring_end")),
-        ("motion", rig.motion, ("simulated", "measured")), ("beside_spring", rig.beside_spring, PARTS),
+        ("motion", rig.motion or "simulated", ("simulated", "measured")),
+        ("beside_spring", rig.beside_spring, PARTS),
     ):  # fmt: skip
         if value not in allowed:
             raise RigError(f"rig {rig.name}: {key} = {value!r}, expected one of {', '.join(allowed)}", key)

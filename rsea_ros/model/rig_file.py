@@ -25,7 +25,7 @@ def rig_to_document(rig: Rig) -> dict[str, Any]:
     document: dict[str, Any] = {n: getattr(rig, n) for n in ("name", "about", "source", "proximal")}
     usual = {
         "linear": False, "ft_end": "spring_end", "encoder_end": "gear_output", "beside_spring": "chassis",
-        "motion": "simulated",
+        "motion": "",
     }  # fmt: skip
     document |= {key: getattr(rig, key) for key, value in usual.items() if getattr(rig, key) != value}
     if rig.loop:

@@ -102,3 +102,34 @@ def test_a_joint_with_other_values_has_no_cause():
     rig = load_rig("pd_joint")
     diagnosis = diagnose([log_joint(rig)], rig, settings=SETTINGS)
     assert (diagnosis.verdict, diagnosis.causes) == ("nothing_wrong", ())
+
+
+def test_a_joint_that_its_weight_holds_is_judged_by_its_motion():
+    """Its motor torque along the measured motion is smeared at each reversal, and says less."""
+    parts, noise = 32, np.random.default_rng(4)
+    t, h = np.arange(1200) / 200.0, 1.0 / 200.0 / parts
+    command = sum(0.4 * np.sin(2.0 * np.pi * f * t + 2.0 * f**2) for f in (0.17, 0.5, 0.83, 1.5, 2.33, 3.17))
+    q, v, moved = 0.0, 0.0, [(0.0, 0.0)] * 2 * parts  # 10 ms
+    for torque in np.repeat(command, parts):
+        net = torque - 3.1 * np.sin(q) - 0.045 * v
+        stopping = net + v * 0.16 / h
+        v += (net - min(max(stopping, -0.15), 0.15)) / 0.16 * h
+        q += v * h
+        moved.append((q, v))
+    late = np.array(moved)[parts - 1 :: parts][:1200].T
+    channels = {"command": Channel(t, command)}
+    for name, y, at, sigma in (
+        ("motor_torque", command, t, 0.01), ("position", late[0], t + 5e-3, 5e-4),
+        ("velocity", late[1], t + 5e-3, 0.02),
+    ):  # fmt: skip
+        channels[name] = Channel(at, y + sigma * noise.standard_normal(1200))
+    tried = trying("coulomb_friction", "stribeck_friction", "encoder_delay", "quadratic_drag")
+    found = diagnose([Record(channels, "held")], load_rig("pendulum"), settings=tried)
+    assert (found.verdict, found.channel, found.extended_rig.motion) == ("explained", "position", "simulated")
+    assert {(c.name, c.status) for c in found.causes} == {
+        ("coulomb_friction", "confirmed"), ("encoder_delay", "confirmed")
+    }  # fmt: skip
+    for cause in found.causes:
+        low, high = next(iter(cause.parameters.values())).ci95
+        true = {"coulomb_friction": 0.15, "encoder_delay": 0.01}[cause.name]
+        assert low < true < high < 1.1 * true

@@ -2,11 +2,14 @@
 
 import numpy as np
 import pytest
+from effect_bench import rms
+from scipy.integrate import solve_ivp
 
 from rsea_ros.errors import IdentificationError
 from rsea_ros.model import inverse
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.simulation import simulate
 from rsea_ros.records.record import Channel, Record
 
 RIG = load_rig("bare_drive")
@@ -128,3 +131,31 @@ def test_the_torque_of_a_motion_is_that_of_the_equation_of_motion():
     assert taken(limited, command=command) == pytest.approx(expected + lost, abs=2e-3)
     with pytest.raises(IdentificationError, match="moving parts, expected one"):
         inverse.torques_along(load_rig("paper_moving_output"), motion())
+
+
+def test_a_rigid_joint_carries_what_holds_it_from_outside():
+    """Its weight and what it stands against, without its inertia: simulated, and along its motion."""
+    law = {"motor_coefficient": 0.1, "load_coefficient": 0.2, "quadratic": 0.0, "creep_velocity": 0.03}
+    rig = load_rig("pendulum").with_values({"spring_end.stiffness": 0.8, "spring_end.damping": 0.1})
+    rig = rig.with_effects(EffectSetting("directional_load_friction", law))
+    t = np.arange(1200) / 400.0
+    held = 1.5 * np.sin(9.0 * t) + np.sin(23.0 * t)
+    inertia, damping = rig["rotor.reflected_inertia"] + 0.15, rig["rotor.reflected_damping"]
+
+    def pendulum(now, x):
+        command = held[min(int(now * 400.0 + 1e-9), 1199)]
+        load = 3.0 * np.sin(x[0]) + 0.8 * x[0] + 0.1 * x[1]
+        friction = abs(0.1 * command + 0.2 * load) * np.tanh(x[1] / 0.03)
+        return x[1], (command - load - damping * x[1] - friction) / inertia
+
+    true = solve_ivp(pendulum, (0.0, 3.0), (0.0, 0.0), t_eval=t + 1 / 400.0, max_step=5e-4, rtol=1e-8)
+    record = Record({"command": Channel(t, held), "position": Channel(t + 1 / 400.0, true.y[0])}, "true")
+    simulated = simulate(rig, record)["position"]
+    bare = simulate(rig.with_effects(), record)["position"]
+    assert rms(simulated - true.y[0]) < 2e-3 * rms(bare - true.y[0])
+    along = inverse.motion_from(record)
+    left, lost = (
+        (inverse.torques_along(r, along)["motor_torque"] - along.judged["motor_torque"])[200:-200]
+        for r in (rig, rig.with_effects())
+    )
+    assert rms(left) < 0.2 * rms(lost)
