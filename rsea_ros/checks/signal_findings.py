@@ -341,5 +341,4 @@ def _modes(f: FloatArray) -> ComplexArray:
 def _share_left(response: ComplexArray, h: ComplexArray, weight: FloatArray) -> FloatArray:
     """Return the share of a response's power that each filter leaves at its best gain. h: shape (k, n)."""
     gain = (h.conj() * response).real @ weight / (np.abs(h) ** 2 @ weight)
-    share: FloatArray = np.abs(response - gain[:, None] * h) ** 2 @ weight / (np.abs(response) ** 2 @ weight)
-    return share
+    return np.asarray(np.abs(response - gain[:, None] * h) ** 2 @ weight / (np.abs(response) ** 2 @ weight))

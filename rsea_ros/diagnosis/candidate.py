@@ -305,5 +305,4 @@ def _main(solution: Solution, name: str) -> tuple[Unknown, float]:
 def _reweight(solution: Solution, problem: Problem) -> FloatArray:
     """Return the derivatives of a solution in units of the noise of another problem on the same samples."""
     new, old = (p.by_row(lambda case, n: case.noise[n]) for p in (problem, solution.problem))
-    result: FloatArray = solution.jacobian * (old / new)[:, None]
-    return result
+    return solution.jacobian * (old / new)[:, None]

@@ -30,8 +30,7 @@ def rms_in(edges: FloatArray, values: FloatArray, residual: FloatArray) -> Float
     which = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, count - 1)
     number = np.bincount(which, minlength=count).astype(float)
     power = np.bincount(which, residual**2, count) / np.where(number > 0.0, number, np.nan)
-    rms: FloatArray = np.sqrt(power)
-    return rms
+    return np.sqrt(power)
 
 
 _SHOWN_ABOVE = 1.25

@@ -200,8 +200,7 @@ def _by_block(
 
 def bootstrap_means(values: FloatArray, resamples: int = DEFAULT.acceptance.resamples) -> FloatArray:
     """Return the means of resampled blocks, shape (resamples,)."""
-    means: FloatArray = values[_draws(len(values), resamples)].mean(axis=1)
-    return means
+    return np.asarray(values[_draws(len(values), resamples)].mean(axis=1))
 
 
 def gain(

@@ -57,8 +57,7 @@ class Confidence:
         """Return the correlation matrix; a value without doubt is correlated with none."""
         sd = np.sqrt(np.diag(self.covariance))
         scale = np.outer(sd, sd)
-        result: FloatArray = np.divide(self.covariance, scale, out=np.eye(len(sd)), where=scale > 0.0)
-        return result
+        return np.asarray(np.divide(self.covariance, scale, out=np.eye(len(sd)), where=scale > 0.0))
 
 
 BLOCK = 1.0
@@ -96,8 +95,7 @@ def inverse_of(matrix: FloatArray) -> FloatArray:
     scale = 1.0 / np.sqrt(np.diag(matrix))
     values, vectors = np.linalg.eigh(matrix * np.outer(scale, scale))
     values = np.maximum(values, len(values) * np.finfo(float).eps * values[-1])
-    result: FloatArray = (vectors / values) @ vectors.T * np.outer(scale, scale)
-    return result
+    return np.asarray((vectors / values) @ vectors.T * np.outer(scale, scale))
 
 
 def _alike(case: Case) -> float:
@@ -112,8 +110,7 @@ def _block_scores(solution: Solution) -> FloatArray:
     scores = sum_by_block(solution.jacobian, solution.residual, blocks)
     counted = len(np.unique(blocks))
     free = max(counted - len(solution.theta), counted / _MOST_CORRECTED)
-    result: FloatArray = scores * np.sqrt(counted / free)
-    return result
+    return np.asarray(scores * np.sqrt(counted / free))
 
 
 def sum_by_block(matrix: FloatArray, residual: FloatArray, blocks: IntArray) -> FloatArray:
@@ -196,12 +193,8 @@ def _without_the_rest(information: FloatArray, index: Sequence[int]) -> FloatArr
     """Return the information on `index` with all other unknowns free (Schur complement)."""
     rest = [i for i in range(len(information)) if i not in index]
     chosen, cross = information[np.ix_(index, index)], information[np.ix_(index, rest)]
-    if not rest:
-        return chosen
-    result: FloatArray = (
-        chosen - cross @ np.linalg.pinv(information[np.ix_(rest, rest)], hermitian=True) @ cross.T
-    )
-    return result
+    inverse = np.linalg.pinv(information[np.ix_(rest, rest)], hermitian=True)
+    return np.asarray(chosen - cross @ inverse @ cross.T)
 
 
 def _remark(unknowns: Sequence[Unknown], moved: FloatArray) -> Remark:

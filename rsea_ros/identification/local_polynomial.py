@@ -113,8 +113,7 @@ def held_mean(command: Channel, edges: FloatArray) -> FloatArray:
     reach = np.interp(edges, command.t, area)
     reach += command.y[-1] * np.maximum(edges - command.t[-1], 0.0)
     reach += command.y[0] * np.minimum(edges - command.t[0], 0.0)
-    means: FloatArray = np.diff(reach) / np.diff(edges)
-    return means
+    return np.asarray(np.diff(reach) / np.diff(edges))
 
 
 def _at(place: FloatArray, y: FloatArray, wanted: FloatArray) -> FloatArray:
@@ -125,8 +124,7 @@ def _at(place: FloatArray, y: FloatArray, wanted: FloatArray) -> FloatArray:
         return y[near]
     from scipy.interpolate import make_interp_spline  # 0.1 s that even stamps need not wait for
 
-    spline: FloatArray = make_interp_spline(place, y, k=_DEGREE)(wanted)
-    return spline
+    return np.asarray(make_interp_spline(place, y, k=_DEGREE)(wanted))
 
 
 def _outside_gaps(place: FloatArray, index: FloatArray) -> BoolArray:
@@ -143,8 +141,7 @@ def _offsets(jitter: FloatArray) -> FloatArray:
     distance = jitter - np.rint(jitter)
     if np.max(np.abs(distance)) < _STEADY:
         return np.zeros(1)
-    quantiles: FloatArray = np.quantile(distance, (np.arange(_DRAWN) + 0.5) / _DRAWN)
-    return quantiles
+    return np.quantile(distance, (np.arange(_DRAWN) + 0.5) / _DRAWN)
 
 
 @dataclass(frozen=True)
@@ -182,16 +179,14 @@ def widen(sd: FloatArray, freedom: FloatArray | float) -> FloatArray:
     """
     m = np.maximum(freedom, 1.0)
     quantile = m * (0.05 ** (-1.0 / m) - 1.0)
-    result: FloatArray = sd * np.sqrt(quantile / -np.log(0.05))
-    return result
+    return np.asarray(sd * np.sqrt(quantile / -np.log(0.05)))
 
 
 def detrend(values: FloatArray) -> FloatArray:
     """Return values without their mean and slope."""
     place = np.linspace(-1.0, 1.0, len(values))
     slope = float(place @ values / (place @ place))
-    result: FloatArray = values - values.mean() - slope * place
-    return result
+    return np.asarray(values - values.mean() - slope * place)
 
 
 _UNKNOWNS = 6
@@ -271,5 +266,4 @@ def _products(u: ComplexArray, y: ComplexArray, centre: int, half: int) -> Compl
     r = (np.arange(first, band.stop) - centre) / half
     powers = np.stack([np.ones(len(r)), r, r**2])
     rows = np.concatenate([powers * u[band], powers, y[band][None]])
-    products: ComplexArray = rows.conj() @ rows.T
-    return products
+    return np.asarray(rows.conj() @ rows.T)

@@ -273,8 +273,7 @@ def broyden_update(matrix: FloatArray, step: FloatArray, change: FloatArray) -> 
     """
     size = np.einsum("ij,ij->j", matrix, matrix)
     along = size * step / max(float(size @ step**2), 1e-300)
-    updated: FloatArray = dger(1.0, along, change - matrix @ step, a=matrix.T).T
-    return updated
+    return np.asarray(dger(1.0, along, change - matrix @ step, a=matrix.T).T)
 
 
 def bounded_step(problem: Problem, theta: FloatArray, normal: FloatArray, slope: FloatArray) -> FloatArray:

@@ -126,8 +126,7 @@ def frequency_response(rig: Rig, output: Output, hz: FloatArray, port: str = "ge
         @ m.placement.T
     )
     s = s[:, 0, 0]
-    response: ComplexArray = (np.stack([s**0, s, s**2], axis=1) @ output.c * q).sum(axis=1) + output.d[p]
-    return response
+    return np.asarray((np.stack([s**0, s, s**2], axis=1) @ output.c * q).sum(axis=1) + output.d[p])
 
 
 PAPER_FACTOR = 0.292
