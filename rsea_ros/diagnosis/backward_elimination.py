@@ -8,20 +8,8 @@ from functools import partial
 
 import numpy as np
 
-from rsea_ros.diagnosis.candidate import (
-    Candidate,
-    FitSetup,
-    effect_size,
-    fit_candidate,
-    is_apart,
-    without_effect,
-)
-from rsea_ros.diagnosis.criteria import (
-    costs_priors_less,
-    is_far_from_floor,
-    keeps_known_values,
-    preference,
-)
+from rsea_ros.diagnosis import candidate, criteria
+from rsea_ros.diagnosis.candidate import Candidate, FitSetup
 from rsea_ros.diagnosis.evaluation import Selection, Trial, trial_of
 from rsea_ros.diagnosis.initial_guess import initial_guesses, view_for
 from rsea_ros.diagnosis.result import Reason
@@ -80,14 +68,14 @@ class ReducedModels:
         as_simple = len(model.causes) > 1 and not self._is_far(model)
         fitted = {t.name for t in trials if t.is_full and t.reason != "at_bound"}
         searched = {t.beside.causes: t.beside.problem for t in trials}.values()
-        barred = {e.name for e in self.effects if not all(is_apart(e, p) for p in searched)}
+        barred = {e.name for e in self.effects if not all(candidate.is_apart(e, p) for p in searched)}
         pairs = [
             (name, rival)
             for name in model.causes
             for rival in self.effects
             if (rival.name in fitted | barred or is_listed(rival, name))
-            and rival.name not in model.problem.acting and is_apart(rival, model.problem)
-            and effect_size(rival.name) < effect_size(name) + as_simple
+            and rival.name not in model.problem.acting and candidate.is_apart(rival, model.problem)
+            and candidate.effect_size(rival.name) < candidate.effect_size(name) + as_simple
         ]
         rests = self.without(model) if pairs else {}
         tried = partial(self._with, model, rests, trials)
@@ -99,12 +87,12 @@ class ReducedModels:
     def is_needed(self, model: Candidate, without: Candidate) -> bool:
         """Return whether a model is better than without one of its causes, or with another in its place."""
         extra, rule = model.parameters - without.parameters, self.settings.acceptance
-        better = preference(model.validation, without.validation, extra, rule).better
-        return better or keeps_known_values(model, without, self.settings)
+        better = criteria.preference(model.validation, without.validation, extra, rule).better
+        return better or criteria.keeps_known_values(model, without, self.settings)
 
     def _without(self, model: Candidate, name: str) -> Candidate:
         """Fit a model again without one of its causes."""
-        return self._fit(model, *without_effect(model.problem, model.solution.theta, name))
+        return self._fit(model, *candidate.without_effect(model.problem, model.solution.theta, name))
 
     def _with(
         self, model: Candidate, rests: Mapping[str, Candidate], trials: Sequence[Trial], name: str,
@@ -127,14 +115,14 @@ class ReducedModels:
         if screened is None or not (is_listed(rival, name) or self._is_close(screened, model)):
             return None
         setup = replace(self._setup(model), is_quick=True, iterations=QUICK_FIT)
-        quick = fit_candidate(setup, screened.problem, screened.theta)
+        quick = candidate.fit_candidate(setup, screened.problem, screened.theta)
         if self._is_far(quick) and not self._is_far(model):  # more steps would not bring it near
             return quick
         return self._fit(model, screened.problem, quick.solution.theta)
 
     def _fit(self, model: Candidate, problem: Problem, theta: FloatArray) -> Candidate:
         """Fit a problem as a model was fitted from which it was made."""
-        return fit_candidate(self._setup(model), problem, theta)
+        return candidate.fit_candidate(self._setup(model), problem, theta)
 
     def _setup(self, model: Candidate) -> FitSetup:
         """Return how a model was fitted."""
@@ -145,7 +133,7 @@ class ReducedModels:
         return screened.cost < self.settings.forward.behind_first * model.solution.cost
 
     def _is_far(self, model: Candidate) -> bool:
-        return is_far_from_floor(model, self.settings)
+        return criteria.is_far_from_floor(model, self.settings)
 
 
 def in_exchange(solution: Solution, name: str, rival: Effect) -> Guess:
@@ -162,7 +150,7 @@ def in_exchange(solution: Solution, name: str, rival: Effect) -> Guess:
     names, own = [u.name for u in problem.unknowns], f"{name}."
     at, free = names.index(own + cause.name), [k for k, n in enumerate(names) if not n.startswith(own)]
     left = residual + matrix[:, at] * (problem.unknowns[at].inner(cause.null) - theta[at])
-    rest, begin = without_effect(problem, theta, name)
+    rest, begin = candidate.without_effect(problem, theta, name)
     weight, others = np.array([u.doubt for u in rest.unknowns]) ** -2.0, matrix[:, free]
     slope = others.T @ left + weight * (begin - start_vector(rest.unknowns))
     end = bounded_step(rest, begin, others.T @ others + np.diag(weight), slope)
@@ -204,7 +192,8 @@ def _prefers(last: Candidate, other: Candidate, models: ReducedModels) -> Reason
         return "explains_less"
     if other.size < last.size:
         return "no_better_than_simpler"
-    return "no_better_than_likelier" if costs_priors_less(other, last, models.settings) else "explains_less"
+    is_likelier = criteria.costs_priors_less(other, last, models.settings)
+    return "no_better_than_likelier" if is_likelier else "explains_less"
 
 
 def nested_sequence(selection: Selection, models: ReducedModels) -> Selection:

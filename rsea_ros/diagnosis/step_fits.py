@@ -13,17 +13,8 @@ from functools import cached_property
 
 import numpy as np
 
-from rsea_ros.diagnosis.candidate import (
-    Candidate,
-    FitSetup,
-    fit_candidate,
-    in_units_of,
-    is_apart,
-    refit,
-    with_clocks,
-    with_doubled_step,
-    without_clocks,
-)
+from rsea_ros.diagnosis import candidate
+from rsea_ros.diagnosis.candidate import Candidate, FitSetup
 from rsea_ros.diagnosis.criteria import is_equally_good, is_far_from_floor
 from rsea_ros.diagnosis.data_split import short_pieces_of
 from rsea_ros.diagnosis.initial_guess import initial_guesses, stated_starts, view_for
@@ -205,13 +196,13 @@ class StepFits:
 
         Near it the clocks stay: without them whatever shifts the response beats the effect that is missing.
         """
-        weighted = in_units_of(self.current.validation, self.current.cases)
+        weighted = candidate.in_units_of(self.current.validation, self.current.cases)
         runs = zip(weighted, self.current.outputs, strict=True)
         cases = tuple(p for case, out in runs for p in short_pieces_of(case, out, self.settings))
         solution = self.current.solution
         problem, theta = replace(solution.problem, cases=cases), solution.theta
         if self.is_far:
-            problem, theta = without_clocks(with_doubled_step(problem), theta)
+            problem, theta = candidate.without_clocks(candidate.with_doubled_step(problem), theta)
         problem = with_unknown_start(problem, theta)
         return solve(problem, theta, iterations=5)
 
@@ -228,7 +219,7 @@ class StepFits:
     def screen(self, solution: Solution) -> list[ScreenedEffect]:
         """Return every other effect after two cheap steps beside a solution, best first."""
         model = solution.problem
-        effects = [e for e in self.effects if e.name not in model.acting and is_apart(e, model)]
+        effects = [e for e in self.effects if e.name not in model.acting and candidate.is_apart(e, model)]
         guesses = self.guesses
 
         def try_effect(i: int) -> ScreenedEffect | None:
@@ -277,7 +268,7 @@ class StepFits:
         problem = replace(screened.problem, cases=self.current.cases)
         theta = screened.theta
         if self.is_far:
-            problem, theta = with_clocks(problem, theta, self.current.problem)
+            problem, theta = candidate.with_clocks(problem, theta, self.current.problem)
         return problem, theta
 
     def _fit_pieces(self, screened: ScreenedEffect) -> ScreenedEffect:
@@ -307,14 +298,16 @@ class StepFits:
 
     def _fit_from(self, problem: Problem, start: FloatArray) -> Candidate:
         """Fit to all training blocks, and again in units of what that leaves."""
-        first = fit_candidate(self._setup, problem, start)
+        first = candidate.fit_candidate(self._setup, problem, start)
         if problem.on_angle:
-            free = fit_candidate(self._setup, replace(problem, on_angle=False), first.solution.theta)
+            on_current = replace(problem, on_angle=False)
+            free = candidate.fit_candidate(self._setup, on_current, first.solution.theta)
             first = free if is_equally_good(free, first, self.settings) else first
         if not self._has_moved(first):
             return first
         is_quick = is_far_from_floor(first, self.settings)
-        return refit(first, replace(self._setup, iterations=FitSetup.iterations, is_quick=is_quick))
+        setup = replace(self._setup, iterations=FitSetup.iterations, is_quick=is_quick)
+        return candidate.refit(first, setup)
 
     @property
     def _setup(self) -> FitSetup:

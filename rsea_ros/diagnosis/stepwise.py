@@ -13,20 +13,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
-from rsea_ros.diagnosis.candidate import (
-    Candidate,
-    FitSetup,
-    effect_size,
-    fit_candidate,
-    leaves_only_noise,
-    on_fine_steps,
-    prior_cost,
-    refit,
-    rescore,
-    where_it_begins,
-    with_noise_reestimated,
-)
-from rsea_ros.diagnosis.criteria import break_tie, is_acceptable, is_far_from_floor, loss_excess, refusal
+from rsea_ros.diagnosis import candidate, criteria
+from rsea_ros.diagnosis.candidate import Candidate, FitSetup
 from rsea_ros.diagnosis.evaluation import Selection, Trial, trial_of
 from rsea_ros.diagnosis.result import Reason
 from rsea_ros.diagnosis.settings import DiagnosisSettings
@@ -77,7 +65,7 @@ class ForwardStep:
         finalists = self._finalists(screened, close)
         models = self.fits.fit_all(finalists)
         if self.fits.is_far and all(
-            is_far_from_floor(m, self.settings) for m in self._acceptable(models)
+            criteria.is_far_from_floor(m, self.settings) for m in self._acceptable(models)
         ):
             models += self.fits.on_measured_angle()
         contenders = self._acceptable(models) or self._pairs(finalists)
@@ -96,11 +84,11 @@ class ForwardStep:
         return StepFits(self.current, self.effects, self.pools, self.settings, self._say)
 
     def _acceptable(self, models: Sequence[Candidate]) -> list[Candidate]:
-        return [m for m in models if is_acceptable(m, self.current, self.settings)]
+        return [m for m in models if criteria.is_acceptable(m, self.current, self.settings)]
 
     def _choose(self, models: Sequence[Candidate]) -> Candidate | None:
         """Return the model to accept."""
-        return break_tie(models, self.current.validation, self.settings)
+        return criteria.break_tie(models, self.current.validation, self.settings)
 
     def _finalists(
         self, screened: Sequence[ScreenedEffect], close: Sequence[ScreenedEffect]
@@ -135,7 +123,7 @@ class ForwardStep:
         Where two effects are missing, a third may fit as well alone, but only far from the rig.
         """
         most = 0.5 * self.fits.on_pieces.cost
-        away = {s.name: prior_cost(s.problem, s.theta) for s in close if s.cost < most}
+        away = {s.name: candidate.prior_cost(s.problem, s.theta) for s in close if s.cost < most}
         nearer = [s for s in close if away.get(s.name, math.inf) < 0.5 * chosen.prior_cost]
         return self._pairs_beside(sorted(nearer, key=lambda s: away[s.name]), self.fits.with_fitted)
 
@@ -160,14 +148,14 @@ class ForwardStep:
 
     def _refusal(self, model: Candidate, chosen: Candidate | None) -> Trial:
         """Return the trial of a model that was not accepted, with the reason."""
-        refused = refusal(model, self.current, self.settings)
+        refused = criteria.refusal(model, self.current, self.settings)
         if refused is not None or chosen is None:
             return trial_of(model, model.newest, self.current, refused or "not_sure")
         loss = float(chosen.validation.loss(chosen.validation).sum())
-        is_alike = loss_excess(model, chosen) < _ALIKE * loss
+        is_alike = criteria.loss_excess(model, chosen) < _ALIKE * loss
         is_larger = model.parameters > chosen.parameters and is_alike
         reason: Reason = "no_better_than_simpler" if is_larger else "explains_less"
-        if loss_excess(model, chosen) < 0.0 and model.prior_cost > chosen.prior_cost:
+        if criteria.loss_excess(model, chosen) < 0.0 and model.prior_cost > chosen.prior_cost:
             reason = "no_better_than_likelier"
         return trial_of(model, model.newest, self.current, reason, chosen.newest)
 
@@ -179,9 +167,9 @@ class ForwardStep:
 
 def _look_alikes(effect: Effect, effects: Sequence[Effect]) -> set[str]:
     """Return the listed look-alikes of an effect, and those that list it and are no larger."""
-    confusable, size = effect.claims.confusable_with, effect_size(effect.name)
+    confusable, size = effect.claims.confusable_with, candidate.effect_size(effect.name)
     alike = look_alikes(effect.name, effects)
-    return {e.name for e in alike if e.name in confusable or effect_size(e.name) <= size}
+    return {e.name for e in alike if e.name in confusable or candidate.effect_size(e.name) <= size}
 
 
 def select_stepwise(
@@ -209,12 +197,12 @@ def go_on(
         if step.accepted is None:
             break
         trials.append(trial_of(step.accepted, step.accepted.newest, current, "replaced"))
-        accepted = where_it_begins(step.accepted, setup)
-        models.append(on_fine_steps(refit(with_noise_reestimated(accepted), setup), setup))
+        accepted = candidate.with_noise_reestimated(candidate.where_it_begins(step.accepted, setup))
+        models.append(candidate.on_fine_steps(candidate.refit(accepted, setup), setup))
     if len(models) == len(selection.models):
         return replace(selection, trials=tuple(trials))
     cases = models[-1].cases
-    return Selection((*(rescore(m, cases) for m in models[:-1]), models[-1]), tuple(trials))
+    return Selection((*(candidate.rescore(m, cases) for m in models[:-1]), models[-1]), tuple(trials))
 
 
 def _fit_nominal(nominal: Problem, setup: FitSetup, start: Rig | None) -> Candidate:
@@ -224,15 +212,16 @@ def _fit_nominal(nominal: Problem, setup: FitSetup, start: Rig | None) -> Candid
     """
     theta = vector_of(nominal.unknowns, start) if start else None
     longer = replace(setup, iterations=25)
-    first = fit_candidate(longer, nominal, theta)
+    first = candidate.fit_candidate(longer, nominal, theta)
     own = {u.name: u.doubt for u in nominal.unknowns if u.name == LOOP_CLOCK}
     if own:
-        other = fit_candidate(longer, nominal, theta_with(nominal.unknowns, first.solution.theta, own))
+        with_own = theta_with(nominal.unknowns, first.solution.theta, own)
+        other = candidate.fit_candidate(longer, nominal, with_own)
         first = min(first, other, key=lambda m: m.solution.cost)
-    return refit(with_noise_reestimated(first), setup)
+    return candidate.refit(candidate.with_noise_reestimated(first), setup)
 
 
 def _is_finished(model: Candidate) -> bool:
     """Return whether only noise is left; coloured noise may hide a cause that a fit still finds."""
     is_coloured = any(case.coloured for case in model.cases)
-    return leaves_only_noise(model, model.settings.floor.only_noise) and not is_coloured
+    return candidate.leaves_only_noise(model, model.settings.floor.only_noise) and not is_coloured

@@ -20,15 +20,7 @@ from dataclasses import replace
 import numpy as np
 
 from rsea_ros.effects.signal_table import sensor_of
-from rsea_ros.identification.noise import (
-    HANN,
-    OVERLAP,
-    TOP,
-    SpectralShape,
-    shape_of,
-    top_of_band,
-    unit_spectra,
-)
+from rsea_ros.identification import noise as noises
 from rsea_ros.identification.problem import Case
 from rsea_ros.model.drive import Drive
 from rsea_ros.records.record import ComplexArray, FloatArray, IntArray
@@ -105,14 +97,14 @@ def is_noise(
     rate = 1.0 / float(np.median(np.diff(case.t[channel])))
     if _lasting_share(residual) > _LASTING or _slow(residual, rate) > _SLOW:
         return False
-    spectra = _as_made(case, channel, unit_spectra(residual, _LONG, 8))
-    shape = shape_of(spectra)
+    spectra = _as_made(case, channel, noises.unit_spectra(residual, _LONG, 8))
+    shape = noises.shape_of(spectra)
     if shape.off > _OFF or _unsteady(spectra, shape, rate) > _UNSTEADY:
         return False
     if _kurtosis(shape, residual) > _SPIKY:
         return False
-    short_spectra = unit_spectra(residual, _SHORT, 16)
-    others = (unit_spectra(w[span], _SHORT, 16) for w in witnesses(case, outputs, channel, ratio))
+    short_spectra = noises.unit_spectra(residual, _SHORT, 16)
+    others = (noises.unit_spectra(w[span], _SHORT, 16) for w in witnesses(case, outputs, channel, ratio))
     return all(_coherent_share(short_spectra, other, rate) < _SHARED for other in others)
 
 
@@ -144,7 +136,7 @@ def _lasting_share(values: FloatArray) -> float:
 
 def _slow(values: FloatArray, rate: float) -> float:
     """Return the power density below 0.25 Hz over that from 0.3 to 1 Hz; 0 where the record is too short."""
-    spectra = unit_spectra(values, 2**30, 2)
+    spectra = noises.unit_spectra(values, 2**30, 2)
     frequency, power = _lines(spectra, rate), np.mean(np.abs(spectra) ** 2, axis=0)
     low = (frequency > 0.0) & (frequency < 0.25)
     above = (frequency >= 0.3) & (frequency < 1.0)
@@ -153,18 +145,18 @@ def _slow(values: FloatArray, rate: float) -> float:
     return float(power[low].mean() / max(power[above].mean(), 1e-300))
 
 
-def _unsteady(spectra: ComplexArray, shape: SpectralShape, rate: float) -> float:
+def _unsteady(spectra: ComplexArray, shape: noises.SpectralShape, rate: float) -> float:
     """Return the variance of the whitened power over time, over stationary noise's, in the worst band."""
     power = np.abs(spectra) ** 2 / shape.at(np.linspace(0.0, 1.0, spectra.shape[1]))
     ratios = [0.0]
     for inside in _bands(_lines(spectra, rate), _STEADY_BANDS):
         level = power[:, inside].mean(axis=1)
-        expected = HANN / np.count_nonzero(inside)
+        expected = noises.HANN / np.count_nonzero(inside)
         ratios.append(float(np.var(level / level.mean())) / expected)
     return max(ratios)
 
 
-def _kurtosis(shape: SpectralShape, values: FloatArray) -> float:
+def _kurtosis(shape: noises.SpectralShape, values: FloatArray) -> float:
     """Return the excess kurtosis of whitened values."""
     white = shape.whiten(values)
     white = white - white.mean()
@@ -173,7 +165,7 @@ def _kurtosis(shape: SpectralShape, values: FloatArray) -> float:
 
 def _coherent_share(a: ComplexArray, b: ComplexArray, rate: float) -> float:
     """Return the share of the power of a that is coherent with b, without its bias, in the worst band."""
-    chance = OVERLAP / len(a)
+    chance = noises.OVERLAP / len(a)
     powers = np.sum(np.abs(a) ** 2, axis=0) * np.sum(np.abs(b) ** 2, axis=0)
     coherence = np.abs(np.sum(a * b.conj(), axis=0)) ** 2 / np.maximum(powers, 1e-300)
     share = (coherence - chance) / (1.0 - chance)
@@ -186,7 +178,7 @@ def _lines(spectra: ComplexArray, rate: float) -> FloatArray:
 
 def _bands(frequency: FloatArray, lows: tuple[float, ...]) -> list[FloatArray]:
     """Return which lines lie in each band that has some."""
-    top = TOP * frequency[-1]
+    top = noises.TOP * frequency[-1]
     ends = zip(lows, (*lows[1:], np.inf), strict=True)
     inside = [(frequency >= low) & (frequency < min(high, top)) for low, high in ends]
     return [which for which in inside if np.count_nonzero(which) > 1]
@@ -213,7 +205,7 @@ def reestimate_noise(case: Case, outputs: Mapping[str, FloatArray], ratio: float
     noise = dict(case.noise)
     for n in channels:
         span = _span(case, n)
-        white, is_white = top_of_band(residuals[n][span], _seams(case, n) - span.start)
+        white, is_white = noises.top_of_band(residuals[n][span], _seams(case, n) - span.start)
         white /= float(np.sqrt(np.mean(case.mask[n][span])))  # what does not count in between is zero
         level = white if is_white and isinstance(case.drive, Drive) else rms[n]  # a Motion is filtered
         noise[n] = max(min(noise[n], level), case.least.get(n, 0.0))
