@@ -82,8 +82,7 @@ BRANCHES: Mapping[str, Branch] = {
         acts=lambda _, every, *__: every[0].signature.carried > DEFAULT.naming.carried),
     "size open by ten": Branch({"naming.conclusion:is_known": lambda size, rule: True}),
     "rig doubtful": Branch({"naming.weighing:is_off_rig": _no}),
-    "known values that pay": Branch({
-        "criteria:keeps_known_values": _no, "backward_elimination:keeps_known_values": _no}),
+    "known values that pay": Branch({"criteria:keeps_known_values": _no}),
     "play remark": Branch({"naming.conclusion:undetermined_play": lambda *_: ()}),
     "missed response by coherence": Branch({"score:missed_response": lambda *_: 0.0}),
 }  # fmt: skip

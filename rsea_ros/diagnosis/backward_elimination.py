@@ -13,7 +13,6 @@ from rsea_ros.diagnosis.candidate import Candidate, FitSetup
 from rsea_ros.diagnosis.evaluation import Selection, Trial, trial_of
 from rsea_ros.diagnosis.initial_guess import initial_guesses, view_for
 from rsea_ros.diagnosis.result import Reason
-from rsea_ros.diagnosis.score import likelier_by
 from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.diagnosis.step_fits import QUICK_FIT, ScreenedEffect, screen
 from rsea_ros.effects.catalogue import effect_named, look_alikes
@@ -207,7 +206,7 @@ def nested_sequence(selection: Selection, models: ReducedModels) -> Selection:
     while len(nested[-1].causes) > 1:
         largest = nested[-1]
         rests = models.without(largest).values()
-        nested.append(max(rests, key=lambda m: likelier_by(m, largest, models.settings.floor.far)))
+        nested.append(max(rests, key=lambda m: criteria.likelier_by(m, largest, models.settings.floor.far)))
     return replace(selection, models=(selection.models[0], *_in_order(list(reversed(nested)))))
 
 

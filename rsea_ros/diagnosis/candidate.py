@@ -291,15 +291,14 @@ def prior_cost(problem: Problem, theta: FloatArray) -> float:
 
 def is_at_bound(solution: Solution, name: str, near: float) -> bool:
     """Return whether an effect's main parameter lies at a bound, within a share `near` of its span."""
-    unknown, at = _main(solution, name)
+    unknown, at = main_of(solution.problem, solution.theta, name)
     return unknown.is_near_bound(at, near)
 
 
-def _main(solution: Solution, name: str) -> tuple[Unknown, float]:
-    """Return the unknown that is an effect's main parameter, and where the fit ended."""
+def main_of(problem: Problem, theta: FloatArray, name: str) -> tuple[Unknown, float]:
+    """Return the unknown that is an effect's main parameter, and where theta has it."""
     main = f"{name}.{effect_named(name).main.name}"
-    unknowns = zip(solution.problem.unknowns, solution.theta, strict=True)
-    return next((u, float(t)) for u, t in unknowns if u.name == main)
+    return next((u, float(t)) for u, t in zip(problem.unknowns, theta, strict=True) if u.name == main)
 
 
 def _reweight(solution: Solution, problem: Problem) -> FloatArray:

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rsea_ros.diagnosis import result as results
+from rsea_ros.diagnosis.candidate import main_of
 from rsea_ros.diagnosis.criteria import is_at_floor, verdict_of
 from rsea_ros.diagnosis.evaluation import Evaluated, Examined, HeldOut, Selection, Trial, held_out_data
 from rsea_ros.diagnosis.naming.status import Named, name_causes
@@ -159,18 +160,12 @@ def undetermined_play(
     gains = {effect.name: effect.gain_holdout for effect in rejected}
     if not trials or trials[-1].name not in gains:
         return ()
-    return (Remark("play_undetermined", values=(_gap(trials[-1]), gains[trials[-1].name])),)
+    gap, at = main_of(trials[-1].problem, trials[-1].theta, trials[-1].name)
+    return (Remark("play_undetermined", values=(gap.outer(at), gains[trials[-1].name])),)
 
 
 def _is_play(name: str) -> bool:
     return "play" in effect_named(name).tags
-
-
-def _gap(trial: Trial) -> float:
-    """Return the gap of a trial with play, rad."""
-    main = f"{trial.name}.{effect_named(trial.name).main.name}"
-    unknowns = zip(trial.problem.unknowns, trial.theta, strict=True)
-    return next(u.outer(float(value)) for u, value in unknowns if u.name == main)
 
 
 SURE_OF_BOUND = 0.25
