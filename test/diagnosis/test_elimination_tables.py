@@ -25,7 +25,7 @@ class World:
     def __init__(self, monkeypatch, fits: Script, *effects):
         self.fits, self.guesses, self.impossible = fits, {}, set()
         self.models = ReducedModels([effect_named(n) for n in effects], POOLS, DEFAULT)
-        monkeypatch.setattr(elimination, "fit_candidate", fits.fit)
+        monkeypatch.setattr(elimination.candidate, "fit_candidate", fits.fit)
         monkeypatch.setattr(elimination, "apply", lambda rig, unknowns, theta: (rig, None))
         monkeypatch.setattr(elimination, "view_for", lambda effect, cases, rig, outputs: None)
         monkeypatch.setattr(elimination, "initial_guesses", lambda effect, view: [{"from": "residual"}])
