@@ -239,8 +239,7 @@ def _jumps(channel: Channel) -> IntArray:
         return np.empty(0, np.int64)
     usual = float(np.quantile(step, _USUAL))
     large = step > _LARGE_JUMP * max(usual, 1e-12)
-    alone = large & ~np.roll(large, 1) & ~np.roll(large, -1)
-    return np.flatnonzero(alone)
+    return np.flatnonzero(large & ~np.roll(large, 1) & ~np.roll(large, -1))
 
 
 def _is_contradicted(record: Record, at: IntArray, sizes: FloatArray) -> BoolArray:

@@ -49,8 +49,7 @@ def train_starts(case: Case, rule: BlockSettings) -> FloatArray:
 
 def blocks_of(case: Case, channel: str, rule: BlockSettings) -> IntArray:
     """Return the number of the block of each sample of a channel."""
-    length = block_length(case, rule)
-    return np.maximum(np.floor((case.t[channel] - case.start) / length), 0).astype(np.int64)
+    return np.maximum(np.floor((case.t[channel] - case.start) / block_length(case, rule)), 0).astype(np.int64)
 
 
 def part(case: Case, sets: tuple[int, ...], rule: BlockSettings) -> Case:
@@ -114,8 +113,7 @@ def as_often_as_commands(case: Case) -> Case:
     period = drive.hold * drive.step
     whole = {n for n, known in case.filters.items() if known.is_sampled}
     every = {n: slice(None, None, 1 if n in whole else _samples_in(period, t)) for n, t in case.t.items()}
-    thinner = replace(drive, at={n: at[every[n]] for n, at in drive.at.items()})
-    return case.keep(every, thinner)
+    return case.keep(every, replace(drive, at={n: at[every[n]] for n, at in drive.at.items()}))
 
 
 def _samples_in(period: float, t: FloatArray) -> int:

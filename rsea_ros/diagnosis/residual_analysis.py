@@ -29,8 +29,7 @@ def rms_in(edges: FloatArray, values: FloatArray, residual: FloatArray) -> Float
     count = len(edges) - 1
     which = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, count - 1)
     number = np.bincount(which, minlength=count).astype(float)
-    power = np.bincount(which, residual**2, count) / np.where(number > 0.0, number, np.nan)
-    return np.sqrt(power)
+    return np.sqrt(np.bincount(which, residual**2, count) / np.where(number > 0.0, number, np.nan))
 
 
 _SHOWN_ABOVE = 1.25
@@ -120,5 +119,4 @@ def _level_in_bins(respect: _Respect, residual: FloatArray, noise: float, channe
 
 def _worst(items: list[Misfit]) -> list[Misfit]:
     """Return the worst misfits that are clearly above the noise."""
-    shown = sorted((m for m in items if m.times_noise > _SHOWN_ABOVE), key=lambda m: -m.times_noise)
-    return shown[:_MOST]
+    return sorted((m for m in items if m.times_noise > _SHOWN_ABOVE), key=lambda m: -m.times_noise)[:_MOST]

@@ -126,8 +126,7 @@ class Score:
         that is larger (maximum likelihood with unknown noise): neither the finest sensor nor the run with
         the least noise dominates the others.
         """
-        scaled = [s / against._units(n) ** 2 for n, s in self.sums.items()]
-        return np.asarray(np.sum(scaled, axis=0))
+        return np.asarray(np.sum([s / against._units(n) ** 2 for n, s in self.sums.items()], axis=0))
 
     @property
     def worst(self) -> str:

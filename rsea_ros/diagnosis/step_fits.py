@@ -306,8 +306,7 @@ class StepFits:
         if not self._has_moved(first):
             return first
         is_quick = is_far_from_floor(first, self.settings)
-        setup = replace(self._setup, iterations=FitSetup.iterations, is_quick=is_quick)
-        return candidate.refit(first, setup)
+        return candidate.refit(first, replace(self._setup, iterations=FitSetup.iterations, is_quick=is_quick))
 
     @property
     def _setup(self) -> FitSetup:

@@ -172,8 +172,7 @@ def _runs(slots: Sequence[int] | IntArray) -> list[tuple[int, int]]:
     """Return first and end of each run of neighbouring slots."""
     slots = [int(k) for k in slots]
     breaks = [i for i, (a, b) in enumerate(pairwise(slots), start=1) if b != a + 1]
-    edges = [0, *breaks, len(slots)]
-    return [(slots[a], slots[b - 1] + 1) for a, b in pairwise(edges)]
+    return [(slots[a], slots[b - 1] + 1) for a, b in pairwise([0, *breaks, len(slots)])]
 
 
 def _span(drive: Drive, begin: float, end: float, run_up: float) -> tuple[int, int]:

@@ -313,8 +313,7 @@ def _columns(solution: Solution) -> dict[str, FloatArray]:
     problem = solution.problem
     measured = [n for n in problem.channels if any(n in case.measured for case in problem.cases)]
     timed = [n for n in measured if n != "motor_torque"]
-    columns = clock_columns(problem, solution.theta, clocks(timed, problem.rig))
-    return dict(zip(timed, columns.T, strict=True))
+    return dict(zip(timed, clock_columns(problem, solution.theta, clocks(timed, problem.rig)).T, strict=True))
 
 
 def _doubts(stamped: Record, even: Record) -> list[tuple[tuple[str, ...], float]]:

@@ -230,8 +230,7 @@ def _seams(case: Case, channel: str) -> IntArray:
     drive = case.drive
     if not isinstance(drive, Drive):
         return np.empty(0, np.int64)
-    ends = [drive.start + drive.step * end for _, end in drive.spans[:-1]]
-    return np.searchsorted(case.t[channel], ends)
+    return np.searchsorted(case.t[channel], [drive.start + drive.step * end for _, end in drive.spans[:-1]])
 
 
 def _doubt(case: Case, residual: FloatArray, channel: str) -> float:

@@ -195,8 +195,7 @@ def _speed(case: Case) -> float:
 
 def _period(case: Case) -> float:
     """Return the time between samples of the channel that has most of them, s."""
-    periods = [float(np.median(np.diff(t))) for t in case.t.values() if len(t) > 1]
-    return min(periods, default=math.nan)
+    return min([float(np.median(np.diff(t))) for t in case.t.values() if len(t) > 1], default=math.nan)
 
 
 def _largest(case: Case, channel: str) -> float:

@@ -231,8 +231,7 @@ def apply(rig: Rig, unknowns: Sequence[Unknown], theta: FloatArray) -> tuple[Rig
 
 def _move(setting: EffectSetting, values: Mapping[str, float]) -> EffectSetting:
     names = (u for u in values if u.startswith(f"{setting.name}."))
-    moved = {**setting.parameters, **{n.split(".")[1]: values[n] for n in names}}
-    return replace(setting, parameters=moved)
+    return replace(setting, parameters={**setting.parameters, **{n.split(".")[1]: values[n] for n in names}})
 
 
 def bounds_of(unknowns: Sequence[Unknown]) -> tuple[FloatArray, FloatArray]:

@@ -208,8 +208,7 @@ def mean_of_line(knots: FloatArray, y: FloatArray, count: int) -> FloatArray:
     """Return the mean over each step of the lines between the stamps (in steps), held beyond the last."""
     at = np.union1d(knots, np.arange(count + 1.0))
     line = np.interp(at, knots, y)
-    area = running_integral(line, at)
-    return np.diff(np.interp(np.arange(count + 1.0), at, area))
+    return np.diff(np.interp(np.arange(count + 1.0), at, running_integral(line, at)))
 
 
 def mean_of_curve(finer: int, knots: FloatArray, y: FloatArray, count: int) -> FloatArray:
