@@ -80,7 +80,7 @@ def spring_design(requirement: Requirement, unit: MotorGear, stiffness: float) -
         stiffness=stiffness,
         rate=spring_rate(stiffness, requirement.arm, requirement.spring_radius),
         deflection=theta,
-        linear=float(mechanism.linear_deflection(stiffness, requirement.torque)),
+        linear=requirement.torque / stiffness,
         error=float(mechanism.linearity_error(requirement.deflection)),
         inner=inner,
         resonance=math.sqrt(stiffness / inner) / (2.0 * math.pi) if inner > 0.0 else math.nan,

@@ -14,7 +14,7 @@ from rsea_ros.diagnosis.evaluation import Selection, Trial, trial_of
 from rsea_ros.diagnosis.initial_guess import initial_guesses, view_for
 from rsea_ros.diagnosis.result import Reason
 from rsea_ros.diagnosis.settings import DiagnosisSettings
-from rsea_ros.diagnosis.step_fits import QUICK_FIT, ScreenedEffect, screen
+from rsea_ros.diagnosis.step_fits import QUICK_FIT, screen
 from rsea_ros.effects.catalogue import effect_named, look_alikes
 from rsea_ros.effects.effect import Effect
 from rsea_ros.effects.guess import Guess
@@ -111,7 +111,8 @@ class ReducedModels:
         with suppress(RseaError):  # an effect that the rig cannot have
             guesses += [in_exchange(model.solution, name, rival)] if can_be_nothing else []
         screened = screen(solution, rival, guesses)
-        if screened is None or not (is_listed(rival, name) or self._is_close(screened, model)):
+        close = self.settings.forward.behind_first * model.solution.cost
+        if screened is None or not (is_listed(rival, name) or screened.cost < close):
             return None
         setup = replace(self._setup(model), is_quick=True, iterations=QUICK_FIT)
         quick = candidate.fit_candidate(setup, screened.problem, screened.theta)
@@ -127,9 +128,6 @@ class ReducedModels:
         """Return how a model was fitted."""
         is_quick = self._is_far(model)
         return FitSetup(model.cases, self.settings, self.pools.run, model.validation, is_quick=is_quick)
-
-    def _is_close(self, screened: ScreenedEffect, model: Candidate) -> bool:
-        return screened.cost < self.settings.forward.behind_first * model.solution.cost
 
     def _is_far(self, model: Candidate) -> bool:
         return criteria.is_far_from_floor(model, self.settings)

@@ -1,6 +1,6 @@
 """A candidate: a variant of the problem fitted to the training blocks and scored on the validation blocks."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -40,12 +40,11 @@ def in_units_of(weights: Score, cases: Sequence[Case]) -> tuple[Case, ...]:
 
     A model that misfits errs more in one run than in another, and not as their sensors' noise does.
     """
-    return tuple(_with_misfit_as_noise(case, weights.ratios_in(k)) for k, case in enumerate(cases))
-
-
-def _with_misfit_as_noise(case: Case, misfit: Mapping[str, float]) -> Case:
-    noise = {n: s * max(1.0, misfit[n]) if n in misfit else s for n, s in case.noise.items()}
-    return replace(case, noise=noise)
+    misfits = map(weights.ratios_in, range(len(cases)))
+    return tuple(
+        replace(case, noise={n: s * max(1.0, misfit.get(n, 1.0)) for n, s in case.noise.items()})
+        for case, misfit in zip(cases, misfits, strict=True)
+    )
 
 
 def with_doubled_step(problem: Problem) -> Problem:

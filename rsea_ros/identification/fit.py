@@ -99,26 +99,21 @@ def fit(
         start = apply(rig, rest.unknowns, first.theta)[0]
     begin = _better_start(problem, start, run)
     solution = solve(*settled_starts(problem, begin, run), run=run)
-    problem = solution.problem
-    outputs = problem.outputs(solution.theta)
-    known = with_noise_of(problem.cases, solution, outputs)
+    outputs, known = _with_noise(solution)
     changes = [b.noise[n] / a.noise[n] for a, b in zip(cases, known, strict=True) for n in a.noise]
     if not all(1.0 / _OTHER_NOISE < change < _OTHER_NOISE for change in changes):
-        solution = solve(replace(problem, cases=known), solution.theta, run=run)
-        outputs = problem.outputs(solution.theta)
-        known = with_noise_of(solution.problem.cases, solution, outputs)
+        solution = solve(replace(solution.problem, cases=known), solution.theta, run=run)
+        outputs, known = _with_noise(solution)
     drifting = timing.with_drifts(solution, run)
     if drifting is not solution:
-        solution, problem = drifting, drifting.problem
-        outputs = problem.outputs(solution.theta)
-        known = with_noise_of(problem.cases, solution, outputs)
+        solution = drifting
+        outputs, known = _with_noise(solution)
     required = timing.required_clocks(solution)
     if required.clocks:
         solution = solve(*timing.free_clocks(solution, required), run=run)
         solution = solve(*timing.without_needless(solution), run=run)
-        problem = solution.problem
-        outputs = problem.outputs(solution.theta)
-        known = with_noise_of(problem.cases, solution, outputs)
+        outputs, known = _with_noise(solution)
+    problem = solution.problem
     for _ in range(_REWEIGHTINGS):
         ratios = ratios_of(problem, solution.problem.cases, outputs)
         if max(ratios.values()) < timing.MISFIT:
@@ -127,6 +122,12 @@ def fit(
         solution = solve(replace(problem, cases=cases), solution.theta, run=run)
         outputs = problem.outputs(solution.theta)
     return solution, known, required
+
+
+def _with_noise(solution: Solution) -> tuple[list[dict[str, FloatArray]], tuple[Case, ...]]:
+    """Return the outputs of a solution, and its cases with the noise that its residual shows."""
+    outputs = solution.problem.outputs(solution.theta)
+    return outputs, with_noise_of(solution.problem.cases, solution, outputs)
 
 
 def with_noise_of(

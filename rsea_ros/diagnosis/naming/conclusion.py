@@ -13,7 +13,7 @@ from rsea_ros.diagnosis.candidate import main_of
 from rsea_ros.diagnosis.criteria import is_at_floor, verdict_of
 from rsea_ros.diagnosis.evaluation import Evaluated, Examined, HeldOut, Selection, Trial, held_out_data
 from rsea_ros.diagnosis.naming.status import Named, name_causes
-from rsea_ros.diagnosis.naming.weighing import CauseAndRivals, Weighed, weigh
+from rsea_ros.diagnosis.naming.weighing import Weighed, weigh
 from rsea_ros.diagnosis.next_experiment import amplitude_series, separating_run
 from rsea_ros.diagnosis.residual_analysis import misfits, spectrum
 from rsea_ros.diagnosis.score import Score, gain, lost_above
@@ -189,8 +189,8 @@ class Outcome:
 
 
 def outcome_of(
-    places: Sequence[CauseAndRivals], selection: Selection, stages: Sequence[Evaluated], examined: Examined,
-    settings: DiagnosisSettings,
+    places: Sequence[Sequence[Weighed]], selection: Selection, stages: Sequence[Evaluated],
+    examined: Examined, settings: DiagnosisSettings,
 ) -> Outcome:  # fmt: skip
     """Return the verdict on weighed causes, those that are named, and those that may not be."""
     levels = settings.floor
@@ -217,7 +217,7 @@ def outcome_of(
 
 
 def naming_of(
-    places: Sequence[CauseAndRivals], stages: Sequence[Evaluated], settings: DiagnosisSettings
+    places: Sequence[Sequence[Weighed]], stages: Sequence[Evaluated], settings: DiagnosisSettings
 ) -> dict[str, Named]:
     """Return the naming of each cause."""
     *before, at_floor = (is_at_floor(stage.test, settings.floor) for stage in stages)

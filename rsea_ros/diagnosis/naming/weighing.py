@@ -191,29 +191,15 @@ class Weighed:
     evidence: Evidence
 
 
-@dataclass(frozen=True)
-class CauseAndRivals:
-    """A cause and its rivals, each with its evidence."""
-
-    cause: Weighed
-    rivals: tuple[Weighed, ...]
-
-
 def weigh(
     selection: Selection, stages: Sequence[Evaluated], held_out: HeldOut, pools: Pools,
     settings: DiagnosisSettings,
-) -> list[CauseAndRivals]:  # fmt: skip
-    """Return every accepted cause and its rivals with the evidence for each, in the order of the stages."""
+) -> list[list[Weighed]]:  # fmt: skip
+    """Return every accepted cause and behind it its rivals, each with its evidence, stage after stage."""
     contested = contests(selection, stages, held_out, pools)
     claims = list(itertools.chain.from_iterable(contested))
     weigh_claim = partial(evidence_for, cases=selection.cases, settings=settings, run=pools.run)
     evidence_by_claim = {id(c): e for c, e in zip(claims, pools.fits.map(weigh_claim, claims), strict=True)}
 
-    def with_evidence(group: Sequence[Claim]) -> tuple[Weighed, ...]:
-        return tuple(Weighed(c, e) for c in group if (e := evidence_by_claim[id(c)]) is not None)
-
-    return [
-        CauseAndRivals(cause[0], with_evidence(rivals))
-        for claim, *rivals in contested
-        if (cause := with_evidence([claim]))
-    ]
+    known = ([(c, evidence_by_claim[id(c)]) for c in group] for group in contested)
+    return [[Weighed(c, e) for c, e in place if e is not None] for place in known if place[0][1] is not None]
