@@ -4,7 +4,7 @@ Margins: Monte Carlo with every part within its tolerance, percentiles.
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -213,11 +213,6 @@ def band_range(stiffness: float, chassis: float, spin: float, spread: float) -> 
     bands = transfer.undamped_band(stiffness, inner)
     cancels = bool(inner.min() < 0.0 < inner.max())
     return float(bands.min()), math.inf if cancels else float(bands.max())
-
-
-def sense_unknown(rows: Sequence[WithTrain]) -> bool:
-    """Return whether the trains differ in the sign of the rotor's spin."""
-    return len({row.design.unit.turns > 0.0 for row in rows}) > 1
 
 
 SPREADS = {"rate": 0.05, "arm": 0.005, "spring_radius": 0.04, "inertia": 0.05, "motor": 0.05}

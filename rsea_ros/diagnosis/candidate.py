@@ -162,8 +162,10 @@ class Candidate:
     @property
     def is_at_bound(self) -> bool:
         """Whether the main parameter of the newest effect is at its bound, so that it is not that effect."""
-        near = self.settings.acceptance.near_bound
-        return bool(self.newest) and is_at_bound(self.solution, self.newest, near)
+        if not self.newest:
+            return False
+        main, at = main_of(self.problem, self.solution.theta, self.newest)
+        return main.is_near_bound(at, self.settings.acceptance.near_bound)
 
 
 ITERATIONS = 12
@@ -286,12 +288,6 @@ def effect_size(name: str) -> int:
 def prior_cost(problem: Problem, theta: FloatArray) -> float:
     """Return the cost of leaving the known values: their sigmas, squared."""
     return float(sum(u.sigmas(float(t)) ** 2 for t, u in zip(theta, problem.unknowns, strict=True)))
-
-
-def is_at_bound(solution: Solution, name: str, near: float) -> bool:
-    """Return whether an effect's main parameter lies at a bound, within a share `near` of its span."""
-    unknown, at = main_of(solution.problem, solution.theta, name)
-    return unknown.is_near_bound(at, near)
 
 
 def main_of(problem: Problem, theta: FloatArray, name: str) -> tuple[Unknown, float]:

@@ -53,11 +53,6 @@ def falls(model: Score, other: Score) -> list[float]:
     return [1.0 - model.ratio(n) / max(other.ratio(n), 1e-12) for n in model.sums]
 
 
-def is_acceptable(model: Candidate, current: Candidate, settings: DiagnosisSettings = DEFAULT) -> bool:
-    """Return whether a model may take the place of the current one."""
-    return refusal(model, current, settings) is None
-
-
 def refusal(model: Candidate, current: Candidate, settings: DiagnosisSettings = DEFAULT) -> Reason | None:
     """Return why a model may not take the place of the current one; None where it may.
 

@@ -234,10 +234,6 @@ class StepFits:
         base, effect = self.on_pieces, screened.effect
         return solve(*add_effect(base.problem, base.theta, effect, dict(effect.typical)), iterations=0)
 
-    def with_fitted(self, screened: ScreenedEffect) -> Solution:
-        """Return the model on the pieces with an effect as fitted so far."""
-        return solve(screened.problem, screened.theta, iterations=0)
-
     def fit_pieces(self, screened: Iterable[ScreenedEffect]) -> list[ScreenedEffect]:
         """Fit screened effects to the short pieces."""
         return list(self.pools.fits.map(self._fit_pieces, screened))

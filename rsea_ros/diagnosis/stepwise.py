@@ -23,7 +23,7 @@ from rsea_ros.effects.catalogue import look_alikes
 from rsea_ros.effects.effect import Effect
 from rsea_ros.identification.confidence import is_off_rig
 from rsea_ros.identification.problem import Problem
-from rsea_ros.identification.solver import Pools, Solution
+from rsea_ros.identification.solver import Pools, Solution, solve
 from rsea_ros.identification.unknowns import LOOP_CLOCK, theta_with, vector_of
 from rsea_ros.model.rig import Rig
 from rsea_ros.progress import Progress
@@ -84,7 +84,7 @@ class ForwardStep:
         return StepFits(self.current, self.effects, self.pools, self.settings, self._say)
 
     def _acceptable(self, models: Sequence[Candidate]) -> list[Candidate]:
-        return [m for m in models if criteria.is_acceptable(m, self.current, self.settings)]
+        return [m for m in models if criteria.refusal(m, self.current, self.settings) is None]
 
     def _choose(self, models: Sequence[Candidate]) -> Candidate | None:
         """Return the model to accept."""
@@ -125,7 +125,8 @@ class ForwardStep:
         most = 0.5 * self.fits.on_pieces.cost
         away = {s.name: candidate.prior_cost(s.problem, s.theta) for s in close if s.cost < most}
         nearer = [s for s in close if away.get(s.name, math.inf) < 0.5 * chosen.prior_cost]
-        return self._pairs_beside(sorted(nearer, key=lambda s: away[s.name]), self.fits.with_fitted)
+        nearer.sort(key=lambda s: away[s.name])
+        return self._pairs_beside(nearer, lambda s: solve(s.problem, s.theta, iterations=0))
 
     def _pairs_beside(
         self, firsts: Sequence[ScreenedEffect], with_first: Callable[[ScreenedEffect], Solution]

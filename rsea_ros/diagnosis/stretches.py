@@ -25,7 +25,7 @@ from rsea_ros.identification.solver import Map
 from rsea_ros.model.drive import LONGEST_STEP, Drive
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.simulation import build
-from rsea_ros.records.record import BoolArray, FloatArray, IntArray
+from rsea_ros.records.record import FloatArray, IntArray
 
 _ROUNDING = 1e-6
 """Of a slot: so much less is a whole one."""
@@ -136,7 +136,8 @@ def on_slots(case: Case, slots: Sequence[int] | IntArray, settings: DiagnosisSet
     times = [(a * length, b * length) for a, b in _runs(slots)]
     spans = tuple(_span(drive, a, b, settings.stretches.run_up) for a, b in times)
     anew = [(first, _state(case, drive, first)) for first, _ in spans if first > 0]
-    keep = {n: _inside(t - case.start, times) for n, t in case.t.items()}
+    since = {n: t - case.start for n, t in case.t.items()}
+    keep = {n: np.any([(t >= a) & (t < b) for a, b in times], axis=0) for n, t in since.items()}
     cut = replace(
         drive, at={n: at[keep[n]] for n, at in drive.at.items()},
         restarts=tuple(sorted([*drive.restarts, *anew])), spans=spans,
@@ -185,7 +186,3 @@ def _state(case: Case, drive: Drive, first: int) -> tuple[float, float]:
     """Return position (rad) and velocity (rad/s) before a step; the former since the start without a zero."""
     (position, velocity), (zero, _) = (state_at(case, drive.start + k * drive.step) for k in (first, 0))
     return position - zero * ("position" in case.floating), velocity
-
-
-def _inside(t: FloatArray, times: Sequence[tuple[float, float]]) -> BoolArray:
-    return np.asarray(np.any([(t >= a) & (t < b) for a, b in times], axis=0))
