@@ -10,14 +10,13 @@ from dataclasses import replace
 
 from rsea_ros.checks.carried import check_diagnosable
 from rsea_ros.checks.faults import Checked, check
-from rsea_ros.diagnosis.backward_elimination import eliminate_backwards
 from rsea_ros.diagnosis.candidate import FitSetup, fit_candidate, is_apart
 from rsea_ros.diagnosis.evaluation import Evaluated, Examined, Selection, evaluate, held_out_data
 from rsea_ros.diagnosis.naming.conclusion import conclude
 from rsea_ros.diagnosis.result import Diagnosis
 from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings
 from rsea_ros.diagnosis.step_fits import StepFits
-from rsea_ros.diagnosis.stepwise import go_on, select_stepwise
+from rsea_ros.diagnosis.stepwise import eliminate_backwards, go_on, select_stepwise
 from rsea_ros.diagnosis.stretches import in_stretches, stretches_of
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.effects.effect import Effect

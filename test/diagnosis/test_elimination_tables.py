@@ -8,10 +8,10 @@ import pytest
 import scripted
 from scripted import POOLS, Script, script
 
-from rsea_ros.diagnosis import backward_elimination as elimination
-from rsea_ros.diagnosis.backward_elimination import ReducedModels, eliminate_backwards, nested_sequence
+from rsea_ros.diagnosis import stepwise as elimination
 from rsea_ros.diagnosis.evaluation import Selection, trial_of
 from rsea_ros.diagnosis.settings import DEFAULT
+from rsea_ros.diagnosis.stepwise import ReducedModels, eliminate_backwards, nested_sequence
 from rsea_ros.effects.catalogue import effect_named
 
 FRICTION, STRIBECK, LUGRE = "coulomb_friction", "stribeck_friction", "lugre_friction"
