@@ -21,7 +21,7 @@ import numpy as np
 
 from rsea_ros.effects.signal_table import sensor_of
 from rsea_ros.identification import noise as noises
-from rsea_ros.identification.problem import Case
+from rsea_ros.identification.problem import Case, counted_span
 from rsea_ros.model.drive import Drive
 from rsea_ros.records.record import ComplexArray, FloatArray, IntArray
 
@@ -90,7 +90,7 @@ def is_noise(
     outputs: of the fitted model, by channel. ratio: of the gear, rotor over output.
     False where the record is too short to decide.
     """
-    span = _span(case, channel)
+    span = counted_span(case.mask[channel])
     residual = residual_of(case, outputs, channel)[span]
     if len(residual) < _FEWEST or not np.any(residual):
         return False
@@ -204,7 +204,7 @@ def reestimate_noise(case: Case, outputs: Mapping[str, FloatArray], ratio: float
     rms = {n: float(np.sqrt(np.mean(residuals[n][case.mask[n]] ** 2))) for n in channels}
     noise = dict(case.noise)
     for n in channels:
-        span = _span(case, n)
+        span = counted_span(case.mask[n])
         white, is_white = noises.top_of_band(residuals[n][span], _seams(case, n) - span.start)
         white /= float(np.sqrt(np.mean(case.mask[n][span])))  # what does not count in between is zero
         level = white if is_white and isinstance(case.drive, Drive) else rms[n]  # a Motion is filtered
@@ -217,12 +217,6 @@ def reestimate_noise(case: Case, outputs: Mapping[str, FloatArray], ratio: float
     for n in above:
         noise[n] = rms[n] * (1.0 + 2.0 * _doubt(case, residuals[n], n) if n in coloured else 1.0)
     return replace(case, noise=noise, coloured=coloured)
-
-
-def _span(case: Case, channel: str) -> slice:
-    """Return the part of a channel from its first sample that counts to its last."""
-    at = np.flatnonzero(case.mask[channel])
-    return slice(int(at[0]), int(at[-1]) + 1) if len(at) else slice(0, len(case.mask[channel]))
 
 
 def _seams(case: Case, channel: str) -> IntArray:

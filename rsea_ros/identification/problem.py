@@ -112,7 +112,8 @@ def case_from(
     start = float(record["command"].t[0]) + SKIPPED_START
     known = {n: outside_gaps(record, record[n].t, SKIPPED_START) for n in channels}
     counts = {n: good[n] & known[n] & np.isfinite(record[n].y) & (record[n].t >= start) for n in channels}
-    heard = record.with_channels(**{n: _counted_span(record[n], counts[n]) for n in channels})
+    spans = {n: counted_span(counts[n]) for n in channels}  # noise elsewhere is not the fit's
+    heard = record.with_channels(**{n: Channel(record[n].t[s], record[n].y[s]) for n, s in spans.items()})
     return Case(
         drive=drive_of(record, rig),
         t=MappingProxyType({n: record[n].t for n in channels}),
@@ -126,11 +127,10 @@ def case_from(
     )
 
 
-def _counted_span(channel: Channel, counts: BoolArray) -> Channel:
-    """Return a channel from its first sample that counts to its last: noise elsewhere is not the fit's."""
+def counted_span(counts: BoolArray) -> slice:
+    """Return the part of a channel from its first sample that counts to its last; all where none does."""
     at = np.flatnonzero(counts)
-    span = slice(int(at[0]), int(at[-1]) + 1) if len(at) else slice(None)
-    return Channel(channel.t[span], channel.y[span])
+    return slice(int(at[0]), int(at[-1]) + 1) if len(at) else slice(0, len(counts))
 
 
 def channels_that_tell(record: Record, rig: Rig) -> list[str]:
