@@ -142,8 +142,6 @@ def undetermined_remarks(unknowns: Sequence[Unknown], confidence: Confidence) ->
     index = [i for i in asked if i not in stuck]
     remarks = [results.Remark("at_bound", (u.name,), (u.outer(float(theta[i])),), u.unit)
                for i, u in enumerate(unknowns) if i in stuck]  # fmt: skip
-    if not index:
-        return tuple(remarks)
     reach = np.array([unknowns[i].reach for i in index])
     pairs = [(unknowns[i], abs(float(theta[i]))) for i in index]  # near 0 a typical size is the reference
     size = np.array([1.0 if u.logarithmic else max(value, 0.1 * u.scale) for u, value in pairs])
