@@ -394,24 +394,14 @@ class Problem:
 
     def by_row(self, number: Callable[[Case, str], float]) -> FloatArray:
         """Return a number that belongs to each case and channel for every residual, shape (m,)."""
-        parts = [
-            np.full(np.count_nonzero(case.mask[n]), number(case, n))
-            for case in self.cases
-            for n in self.present(case)
-        ]
-        return np.concatenate(parts)
+        rows = ((case, n) for case in self.cases for n in self.present(case))
+        return np.concatenate([np.full(np.count_nonzero(case.mask[n]), number(case, n)) for case, n in rows])
 
     def since_start(self) -> FloatArray:
         """Return for every residual the time since the start of its record, s, shape (m,)."""
-        return np.concatenate(
-            [
-                case.t[n][case.mask[n]]
-                - case.start
-                + (case.drive.origin if isinstance(case.drive, Drive) else 0.0)
-                for case in self.cases
-                for n in self.present(case)
-            ]
-        )
+        begins = [case.drive.origin if isinstance(case.drive, Drive) else 0.0 for case in self.cases]
+        cases = zip(self.cases, begins, strict=True)
+        return np.concatenate([c.t[n][c.mask[n]] - c.start + at for c, at in cases for n in self.present(c)])
 
     def present(self, case: Case) -> list[str]:
         """Return the channels of a case that count, in a fixed order."""
