@@ -355,11 +355,7 @@ def estimate_response(record: Record, output: str, sensor: Sensor = UNFILTERED) 
         sampled = known.response(lines.frequency, period)
     response, sd = unfold(aligned, lines.frequency, lines.response / sampled, lines.sd / np.abs(sampled))
     response, sd = response * sampled / passed, sd * np.abs(sampled / passed)
-    return FrequencyResponse(
-        input="command", output=output, frequency=lines.frequency, response=response,
-        coherence=lines.coherence, sd=sd, method=lines.method, noise=lines.noise,
-        distortion=lines.distortion,
-    )
+    return FrequencyResponse("command", output, **{**vars(lines), "response": response, "sd": sd})
 
 
 def responses_of(record: Record, rig: Rig) -> tuple[FrequencyResponse, ...]:
@@ -403,9 +399,8 @@ def model_responses(rig: Rig, frequencies: Mapping[str, FloatArray]) -> dict[str
 
 def _output_row(rig: Rig, output: str, m: Mechanics) -> FloatArray:
     if output == "ft":
-        return rig["spring.stiffness"] * read_row(rig, m, st.DEFLECTION) + rig["spring.damping"] * read_row(
-            rig, m, st.DEFLECTION_RATE
-        )
+        deflection, rate = (read_row(rig, m, signal) for signal in (st.DEFLECTION, st.DEFLECTION_RATE))
+        return rig["spring.stiffness"] * deflection + rig["spring.damping"] * rate
     if output == "deflection":
         return read_row(rig, m, st.DEFLECTION)
     return encoder_row(rig, m, is_rate=output == "velocity")

@@ -15,7 +15,7 @@ European Journal of Control 15, 2009.)
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.fft import rfft
@@ -163,11 +163,8 @@ class Lines:
     def up_to(self, highest: float) -> Lines:
         """Return the lines up to a frequency, Hz."""
         n = int(np.searchsorted(self.frequency, highest, side="right"))
-        return Lines(
-            method=self.method, frequency=self.frequency[:n], response=self.response[:n], sd=self.sd[:n],
-            coherence=self.coherence[:n], noise=None if self.noise is None else self.noise[:n],
-            distortion=None if self.distortion is None else self.distortion[:n],
-        )
+        cut = {k: v[:n] for k, v in vars(self).items() if k != "method" and v is not None}
+        return replace(self, **cut)
 
 
 def widen(sd: FloatArray, freedom: FloatArray | float) -> FloatArray:
@@ -251,12 +248,8 @@ def _estimates(
     residual = total - np.einsum("bi,bi->b", wanted.conj(), unknowns).real
     lines = np.array([2 * half + 1 for _, half in bands])
     noise = np.maximum(residual, _ROUNDING * total) / (lines - _UNKNOWNS)
-    return (
-        unknowns[:, 0] / scale[:, 0],
-        noise * inverse[:, 0, 0].real / scale[:, 0] ** 2,
-        noise,
-        scale[:, 0] ** 2 / lines,
-    )
+    size = scale[:, 0]
+    return unknowns[:, 0] / size, noise * inverse[:, 0, 0].real / size**2, noise, size**2 / lines
 
 
 def _products(u: ComplexArray, y: ComplexArray, centre: int, half: int) -> ComplexArray:
