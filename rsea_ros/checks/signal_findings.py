@@ -216,19 +216,15 @@ def _of_angle(record: Record, name: str) -> Iterator[Finding]:
     if not made_up.any():
         return
     first = int(np.argmax(made_up))
-    wrapped = bool(turns[first])
     where = f"by {sizes[first]:.3g} rad at {channel.t[at[first] + 1]:.4g} s"
+    why = "the velocity did not make it"
+    remedy = "cut the record there with --from or --to: the encoder began to count anew"
+    if turns[first]:
+        why = "a whole turn"
+        remedy = '`expression: "unwrap(…)"` in the import map, or publish the angle unwrapped'
     yield Finding(
-        "red",
-        "angle_jumps",
-        name,
-        float(np.count_nonzero(made_up)),
-        "1",
-        expected="none",
-        detail=f"{where}: {'a whole turn' if wrapped else 'the velocity did not make it'}",
-        remedy='`expression: "unwrap(…)"` in the import map, or publish the angle unwrapped'
-        if wrapped
-        else "cut the record there with --from or --to: the encoder began to count anew",
+        "red", "angle_jumps", name, float(np.count_nonzero(made_up)), "1", expected="none",
+        detail=f"{where}: {why}", remedy=remedy,
     )
 
 
