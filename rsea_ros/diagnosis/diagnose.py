@@ -62,8 +62,8 @@ def diagnose(
     for record in [*records, *([holdout] if holdout is not None else [])]:
         check_diagnosable(record)
     rig, unseen = as_recorded(rig, records)
-    checked, remarks = _steady([check(r, rig) for r in records], rig)
-    tested = _steady([check(holdout, rig)], rig)[0][0] if holdout is not None else None
+    checked, remarks = on_steady_clocks([check(r, rig) for r in records], rig)
+    tested = on_steady_clocks([check(holdout, rig)], rig)[0][0] if holdout is not None else None
     examined = Examined(records, checked, tested, rig)
     with worker_pools() as pools:
         nominal = nominal_problem(checked, rig, settings, pools.run)
@@ -169,7 +169,7 @@ def best_single_effect(record: Record, rig: Rig) -> str:
     return best.name if best else ""
 
 
-def _steady(checked: Sequence[Checked], rig: Rig) -> tuple[list[Checked], tuple[Remark, ...]]:
+def on_steady_clocks(checked: Sequence[Checked], rig: Rig) -> tuple[list[Checked], tuple[Remark, ...]]:
     """Return records on the even clocks that their values agree with, and remarks on the changes."""
     steady = with_even_clocks([c.record for c in checked], [c.masked for c in checked], rig)
     records = zip(checked, steady.records, strict=True)

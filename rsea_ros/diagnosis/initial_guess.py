@@ -23,8 +23,7 @@ from rsea_ros.effects.effect import Effect
 from rsea_ros.effects.guess import Guess, ResidualView
 from rsea_ros.effects.signal_table import ROTOR_ANGLE, Port
 from rsea_ros.identification.missing_torque import Injector, missing_torque
-from rsea_ros.identification.noise_level import residual_of
-from rsea_ros.identification.problem import Case, Problem
+from rsea_ros.identification.problem import Case, Problem, residual_of
 from rsea_ros.identification.start import LARGEST, torque_size
 from rsea_ros.identification.unknowns import WELL_KNOWN, theta_with
 from rsea_ros.model.drive import Drive
@@ -138,7 +137,7 @@ def torque_along(
     if not channel:
         return None
     t, keep = case.t[channel], case.mask[channel]
-    residual = {n: np.where(case.mask[n], residual_of(case, outputs, n), 0.0) for n in outputs}
+    residual = {n: residual_of(case, outputs, n) for n in outputs}
     injector, period = Injector(rig, case.drive, case.t), float(np.median(np.diff(t)))
     missing = missing_torque(case, residual, injector, period)
     middle = case.drive.start + missing.t + 0.5 * period

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rsea_ros.diagnosis.result import Misfit, Spectrum
-from rsea_ros.identification.problem import Case
+from rsea_ros.identification.problem import Case, residual_of
 from rsea_ros.model.drive import Drive
 from rsea_ros.model.rig import Rig
 from rsea_ros.records.record import FloatArray
@@ -43,7 +43,7 @@ _MOST = 3
 
 def misfits(case: Case, outputs: dict[str, FloatArray], channel: str, rig: Rig) -> tuple[Misfit, ...]:
     """Return where the residual of a channel is more than its noise, worst first in each respect."""
-    residual = np.where(case.mask[channel], case.measured[channel] - outputs[channel], 0.0)
+    residual = residual_of(case, outputs, channel)
     worst = _worst(by_frequency(case.t[channel], residual, case.noise[channel], channel))
     keep = case.mask[channel]
     for respect in _respects(case, channel, rig):
@@ -72,7 +72,7 @@ def spectrum(
     """Return the residual's amplitude density before and after, with the noise floor's."""
     densities = []
     for outputs in (before, after):
-        residual = np.where(case.mask[channel], case.measured[channel] - outputs[channel], 0.0)
+        residual = residual_of(case, outputs, channel)
         rate, frequency, level = stamped_density(case.t[channel], residual, _SEGMENT)
         densities.append(np.sqrt(level))
     return Spectrum(

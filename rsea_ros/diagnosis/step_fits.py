@@ -136,7 +136,7 @@ def _with_present_derivatives(
     step = _Step(problem, np.column_stack([current.jacobian, columns]))
     best = ScreenedEffect(effect, problem, theta, step.cost(theta, residual))
     for _ in range(_STEPS):
-        better = step.take(best, residual, (1.0, _PART))
+        better = step.take(best, residual)
         if better is None:
             break
         best, residual = better
@@ -157,13 +157,11 @@ class _Step:
         """Return the squared residual plus the cost of leaving the priors."""
         return power(residual) + float(np.sum((self._prior * (theta - self._centre)) ** 2))
 
-    def take(
-        self, start: ScreenedEffect, residual: FloatArray, shares: Sequence[float]
-    ) -> tuple[ScreenedEffect, FloatArray] | None:
+    def take(self, start: ScreenedEffect, residual: FloatArray) -> tuple[ScreenedEffect, FloatArray] | None:
         """Return the end of a step, or of a share of it, and its residual; None where none helps."""
         slope = self._matrix.T @ residual + self._prior**2 * (start.theta - self._centre)
         aim = bounded_step(self._problem, start.theta, self._normal, slope)
-        for share in shares:
+        for share in (1.0, _PART):
             theta = start.theta + share * (aim - start.theta)
             stepped = self._problem.residual(theta)
             cost = self.cost(theta, stepped)

@@ -21,7 +21,7 @@ import numpy as np
 
 from rsea_ros.effects.signal_table import sensor_of
 from rsea_ros.identification import noise as noises
-from rsea_ros.identification.problem import Case, counted_span
+from rsea_ros.identification.problem import Case, counted_span, residual_of
 from rsea_ros.model.drive import Drive
 from rsea_ros.records.record import ComplexArray, FloatArray, IntArray
 
@@ -36,8 +36,7 @@ def witnesses(
     t = case.t[channel]
     for n in case.measured.keys() & outputs.keys():
         if sensor_of(n) != sensor_of(channel):  # the noise of one encoder's channels agrees
-            residual = np.where(case.mask[n], case.measured[n] - outputs[n], 0.0)
-            yield np.interp(t, case.t[n], residual)
+            yield np.interp(t, case.t[n], residual_of(case, outputs, n))
     command, q, v, load = _motion(case, outputs, t)
     late = (t - t.mean()) / max(float(np.ptp(t)), 1e-9)
     yield command
@@ -106,11 +105,6 @@ def is_noise(
     short_spectra = noises.unit_spectra(residual, _SHORT, 16)
     others = (noises.unit_spectra(w[span], _SHORT, 16) for w in witnesses(case, outputs, channel, ratio))
     return all(_coherent_share(short_spectra, other, rate) < _SHARED for other in others)
-
-
-def residual_of(case: Case, outputs: Mapping[str, FloatArray], channel: str) -> FloatArray:
-    """Return measured - simulated, 0 where a sample does not count, shape of the channel."""
-    return np.where(case.mask[channel], case.measured[channel] - outputs[channel], 0.0)
 
 
 def _as_made(case: Case, channel: str, spectra: ComplexArray) -> ComplexArray:

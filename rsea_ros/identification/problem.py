@@ -275,6 +275,11 @@ def _instants(drive: Drive, clocks: Clocks) -> Mapping[str, FloatArray]:
     }
 
 
+def residual_of(case: Case, outputs: Mapping[str, FloatArray], channel: str) -> FloatArray:
+    """Return measured - simulated, 0 where a sample does not count, shape of the channel."""
+    return np.where(case.mask[channel], case.measured[channel] - outputs[channel], 0.0)
+
+
 def weighted_residual(case: Case, outputs: Mapping[str, FloatArray], channels: Sequence[str]) -> FloatArray:
     """Return (simulated - measured) / noise of the samples that count, channel after channel.
 
