@@ -21,7 +21,7 @@ from rsea_ros.diagnosis.evaluation import held_out_data
 from rsea_ros.diagnosis.naming.evidence import Evidence, Signature
 from rsea_ros.diagnosis.naming.flexible import Flexible
 from rsea_ros.diagnosis.naming.status import COEFFICIENTS, features, probabilities_and_status
-from rsea_ros.diagnosis.naming.weighing import CauseAndRivals, weigh
+from rsea_ros.diagnosis.naming.weighing import Weighed, weigh
 from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.identification.solver import worker_pools
 
@@ -116,10 +116,10 @@ def _weigh(plan: Plan) -> dict[str, Any]:
     return floors | {"places": [_place(p) for p in places]}
 
 
-def _place(place: CauseAndRivals) -> list[dict[str, Any]]:
+def _place(place: Sequence[Weighed]) -> list[dict[str, Any]]:
     """Return the evidence for a cause and its rivals, with the size that each has."""
     weighed = []
-    for w in (place.cause, *place.rivals):
+    for w in place:
         sizes = zip(w.claim.problem.unknowns, w.claim.theta, strict=True)
         own = [(u, theta) for u, theta in sizes if u.name.startswith(f"{w.claim.name}.")]
         values = {u.name.split(".")[1]: u.outer(float(theta)) for u, theta in own}

@@ -20,9 +20,9 @@ from bench.diagnosis.played import Entry, Line, play as diagnosed, said, verdict
 from bench.frozen.cases import bench_records, lab_records, small_records
 from bench.frozen.play import KEPT
 from bench.results import Row, append_line, read_lines
-from rsea_ros.diagnosis.backward_elimination import ReducedModels
 from rsea_ros.diagnosis.candidate import Candidate
 from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings
+from rsea_ros.diagnosis.stepwise import ReducedModels
 
 Off = Callable[..., Any]
 _WITH = ReducedModels._with
@@ -74,7 +74,7 @@ BRANCHES: Mapping[str, Branch] = {
     "a tenth of the guess": Branch({"step_fits:_other_guesses": _nothing}),
     "common clock into the delay": Branch({"candidate:with_clocks_in_delay": lambda solution: None}),
     "quick replacement dropped": Branch(
-        {"backward_elimination:ReducedModels._with": _fitted_on}, acts=_was_dropped),
+        {"stepwise:ReducedModels._with": _fitted_on}, acts=_was_dropped),
     "close rivals fitted to the end": Branch(
         {"naming.weighing:_beside_all_causes": lambda tried, *_: tried}),
     "wandering sensor (carried)": Branch(
@@ -82,8 +82,7 @@ BRANCHES: Mapping[str, Branch] = {
         acts=lambda _, every, *__: every[0].signature.carried > DEFAULT.naming.carried),
     "size open by ten": Branch({"naming.conclusion:is_known": lambda size, rule: True}),
     "rig doubtful": Branch({"naming.weighing:is_off_rig": _no}),
-    "known values that pay": Branch({
-        "criteria:keeps_known_values": _no, "backward_elimination:keeps_known_values": _no}),
+    "known values that pay": Branch({"criteria:keeps_known_values": _no}),
     "play remark": Branch({"naming.conclusion:undetermined_play": lambda *_: ()}),
     "missed response by coherence": Branch({"score:missed_response": lambda *_: 0.0}),
 }  # fmt: skip

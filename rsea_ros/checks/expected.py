@@ -151,8 +151,7 @@ def _captured_share(spectra: ComplexArray, values: FloatArray) -> FloatArray:
 
 def usable(q: Quotient) -> BoolArray:
     """Return the informative bands: coherent, and with more than a trace of the predicted power."""
-    keep: BoolArray = (q.coherence > 0.3) & (q.weight > 1e-7 * q.weight.max()) & np.isfinite(q.sd)
-    return keep
+    return np.asarray((q.coherence > 0.3) & (q.weight > 1e-7 * q.weight.max()) & np.isfinite(q.sd))
 
 
 def _segments(values: FloatArray, length: int) -> ComplexArray:

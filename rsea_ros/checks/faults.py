@@ -238,8 +238,7 @@ def outliers(channel: Channel, name: str) -> BoolArray:
     steps = np.abs(np.diff(channel.y))
     least = float(np.nanmedian(steps[steps > 0.0])) if np.any(steps > 0.0) else 0.0
     alone = (channel.y > around[:, -3]) | (channel.y < around[:, 2])
-    marked: BoolArray = alone & (np.abs(channel.y - middle) > _SPIKE * np.maximum(spread, least))
-    return marked
+    return np.asarray(alone & (np.abs(channel.y - middle) > _SPIKE * np.maximum(spread, least)))
 
 
 def clipping(channel: Channel, name: str) -> BoolArray:

@@ -5,12 +5,7 @@ from collections.abc import Collection
 
 import numpy as np
 
-from rsea_ros.checks.expected import (
-    WITNESSES,
-    MotionBeside,
-    motion_beside,
-    witness_of,
-)
+from rsea_ros.checks import expected as expectation
 from rsea_ros.identification.noise import step_of
 from rsea_ros.records.record import COMMANDS, MEASURED, BoolArray, Channel, FloatArray, Record
 from rsea_ros.records.statistics import running_integral, runs_of
@@ -187,19 +182,19 @@ def _mostly(suspect: BoolArray, clearly: BoolArray, share: float = _MOVED) -> Bo
     return suspect if enough else np.zeros(len(suspect), bool)
 
 
-def _motion(record: Record, name: str, suspect: BoolArray, kind: str) -> MotionBeside | None:
+def _motion(record: Record, name: str, suspect: BoolArray, kind: str) -> expectation.MotionBeside | None:
     """Return how the best witness moved at the samples of a channel, None without a witness.
 
     Sensors that are held with the channel are no witnesses. Where none is left, the command speaks for a
     motion only if the noise of one of them would have shown at standstill.
     """
     if kind != "frozen_samples":
-        return _both_moved(record, name, witness_of(record, name))
+        return _both_moved(record, name, expectation.witness_of(record, name))
     long = suspect & in_long_runs(suspect, record[name].rate)
     at = record[name].t[long if long.any() else suspect]  # a quantum repeats values by chance
     held = {n for n in record.channels if n != "command" and _is_held(record[n], at)}
-    witness = witness_of(record, name, but=held - {name})
-    others = witness_of(record, name)
+    witness = expectation.witness_of(record, name, but=held - {name})
+    others = expectation.witness_of(record, name)
     alone = others != witness and witness in (None, "command", "motor_torque")
     shown = not alone or any(_dithers(record[n]) for n in held)
     return _both_moved(record, name, witness if shown else others, held - {name})
@@ -207,17 +202,17 @@ def _motion(record: Record, name: str, suspect: BoolArray, kind: str) -> MotionB
 
 def _both_moved(
     record: Record, name: str, witness: str | None, but: Collection[str] = ()
-) -> MotionBeside | None:
+) -> expectation.MotionBeside | None:
     """Return how a witness moved, where another one did too: a dead sensor moves by its noise.
 
     A sensor's own noise, which would change its value at standstill, is a second witness.
     """
-    first = motion_beside(record, name, witness)
-    others = [n for n in WITNESSES[name] if n in record and n not in but and n != witness]
-    beside = [m for n in others if (m := motion_beside(record, name, n)) is not None]
+    first = expectation.motion_beside(record, name, witness)
+    others = [n for n in expectation.WITNESSES[name] if n in record and n not in but and n != witness]
+    beside = [m for n in others if (m := expectation.motion_beside(record, name, n)) is not None]
     if first is None or not beside or _dithers(record[name]):
         return first
-    return MotionBeside(first.moved & np.any([m.moved for m in beside], axis=0), first.speed)
+    return expectation.MotionBeside(first.moved & np.any([m.moved for m in beside], axis=0), first.speed)
 
 
 def _is_held(channel: Channel, at: FloatArray) -> bool:

@@ -216,19 +216,15 @@ def _of_angle(record: Record, name: str) -> Iterator[Finding]:
     if not made_up.any():
         return
     first = int(np.argmax(made_up))
-    wrapped = bool(turns[first])
     where = f"by {sizes[first]:.3g} rad at {channel.t[at[first] + 1]:.4g} s"
+    why = "the velocity did not make it"
+    remedy = "cut the record there with --from or --to: the encoder began to count anew"
+    if turns[first]:
+        why = "a whole turn"
+        remedy = '`expression: "unwrap(…)"` in the import map, or publish the angle unwrapped'
     yield Finding(
-        "red",
-        "angle_jumps",
-        name,
-        float(np.count_nonzero(made_up)),
-        "1",
-        expected="none",
-        detail=f"{where}: {'a whole turn' if wrapped else 'the velocity did not make it'}",
-        remedy='`expression: "unwrap(…)"` in the import map, or publish the angle unwrapped'
-        if wrapped
-        else "cut the record there with --from or --to: the encoder began to count anew",
+        "red", "angle_jumps", name, float(np.count_nonzero(made_up)), "1", expected="none",
+        detail=f"{where}: {why}", remedy=remedy,
     )
 
 
@@ -239,8 +235,7 @@ def _jumps(channel: Channel) -> IntArray:
         return np.empty(0, np.int64)
     usual = float(np.quantile(step, _USUAL))
     large = step > _LARGE_JUMP * max(usual, 1e-12)
-    alone = large & ~np.roll(large, 1) & ~np.roll(large, -1)
-    return np.flatnonzero(alone)
+    return np.flatnonzero(large & ~np.roll(large, 1) & ~np.roll(large, -1))
 
 
 def _is_contradicted(record: Record, at: IntArray, sizes: FloatArray) -> BoolArray:
@@ -341,5 +336,4 @@ def _modes(f: FloatArray) -> ComplexArray:
 def _share_left(response: ComplexArray, h: ComplexArray, weight: FloatArray) -> FloatArray:
     """Return the share of a response's power that each filter leaves at its best gain. h: shape (k, n)."""
     gain = (h.conj() * response).real @ weight / (np.abs(h) ** 2 @ weight)
-    share: FloatArray = np.abs(response - gain[:, None] * h) ** 2 @ weight / (np.abs(response) ** 2 @ weight)
-    return share
+    return np.asarray(np.abs(response - gain[:, None] * h) ** 2 @ weight / (np.abs(response) ** 2 @ weight))

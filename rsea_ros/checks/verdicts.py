@@ -187,9 +187,7 @@ def _sure(p: Pair) -> list[int]:
 def _signs(p: Pair) -> list[Equation]:
     """Return the equation of a sign: 1 for a turned one, of which the changes are a sum modulo 2."""
     ks = _sure(p) or ([0] if p.sds and p.sds[0] < 0.25 and p.law.powers == (0,) else [])
-    if not ks:
-        return []
-    return [Equation({p.law.y: 1.0, p.law.x: 1.0}, float(p.ratios[ks[0]] < 0.0), 0.15, p)]
+    return [Equation({p.law.y: 1.0, p.law.x: 1.0}, float(p.ratios[k] < 0.0), 0.15, p) for k in ks[:1]]
 
 
 def _factors(p: Pair) -> Iterator[Equation]:

@@ -95,11 +95,6 @@ def deflection(k_s: Values, torque: Values) -> FloatArray:
     return np.where(inside, 0.5 * np.arcsin(np.where(inside, sine, 0.0)), np.nan)
 
 
-def linear_deflection(k_s: Values, torque: Values) -> FloatArray:
-    """Return T / K_s, rad: the deflection if the spring were linear."""
-    return np.divide(torque, k_s)
-
-
 def linearity_error(theta: Values) -> FloatArray:
     """Return 1 - sin(2 theta) / (2 theta): the share of K_s theta that Eq. (8) does not give. theta: rad."""
     return np.asarray(1.0 - np.sinc(2.0 * np.asarray(theta) / np.pi))

@@ -4,7 +4,7 @@ Margins: Monte Carlo with every part within its tolerance, percentiles.
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -80,7 +80,7 @@ def spring_design(requirement: Requirement, unit: MotorGear, stiffness: float) -
         stiffness=stiffness,
         rate=spring_rate(stiffness, requirement.arm, requirement.spring_radius),
         deflection=theta,
-        linear=float(mechanism.linear_deflection(stiffness, requirement.torque)),
+        linear=requirement.torque / stiffness,
         error=float(mechanism.linearity_error(requirement.deflection)),
         inner=inner,
         resonance=math.sqrt(stiffness / inner) / (2.0 * math.pi) if inner > 0.0 else math.nan,
@@ -213,11 +213,6 @@ def band_range(stiffness: float, chassis: float, spin: float, spread: float) -> 
     bands = transfer.undamped_band(stiffness, inner)
     cancels = bool(inner.min() < 0.0 < inner.max())
     return float(bands.min()), math.inf if cancels else float(bands.max())
-
-
-def sense_unknown(rows: Sequence[WithTrain]) -> bool:
-    """Return whether the trains differ in the sign of the rotor's spin."""
-    return len({row.design.unit.turns > 0.0 for row in rows}) > 1
 
 
 SPREADS = {"rate": 0.05, "arm": 0.005, "spring_radius": 0.04, "inertia": 0.05, "motor": 0.05}

@@ -1,6 +1,6 @@
 """A candidate: a variant of the problem fitted to the training blocks and scored on the validation blocks."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -40,12 +40,11 @@ def in_units_of(weights: Score, cases: Sequence[Case]) -> tuple[Case, ...]:
 
     A model that misfits errs more in one run than in another, and not as their sensors' noise does.
     """
-    return tuple(_with_misfit_as_noise(case, weights.ratios_in(k)) for k, case in enumerate(cases))
-
-
-def _with_misfit_as_noise(case: Case, misfit: Mapping[str, float]) -> Case:
-    noise = {n: s * max(1.0, misfit[n]) if n in misfit else s for n, s in case.noise.items()}
-    return replace(case, noise=noise)
+    misfits = map(weights.ratios_in, range(len(cases)))
+    return tuple(
+        replace(case, noise={n: s * max(1.0, misfit.get(n, 1.0)) for n, s in case.noise.items()})
+        for case, misfit in zip(cases, misfits, strict=True)
+    )
 
 
 def with_doubled_step(problem: Problem) -> Problem:
@@ -163,8 +162,10 @@ class Candidate:
     @property
     def is_at_bound(self) -> bool:
         """Whether the main parameter of the newest effect is at its bound, so that it is not that effect."""
-        near = self.settings.acceptance.near_bound
-        return bool(self.newest) and is_at_bound(self.solution, self.newest, near)
+        if not self.newest:
+            return False
+        main, at = main_of(self.problem, self.solution.theta, self.newest)
+        return main.is_near_bound(at, self.settings.acceptance.near_bound)
 
 
 ITERATIONS = 12
@@ -289,21 +290,13 @@ def prior_cost(problem: Problem, theta: FloatArray) -> float:
     return float(sum(u.sigmas(float(t)) ** 2 for t, u in zip(theta, problem.unknowns, strict=True)))
 
 
-def is_at_bound(solution: Solution, name: str, near: float) -> bool:
-    """Return whether an effect's main parameter lies at a bound, within a share `near` of its span."""
-    unknown, at = _main(solution, name)
-    return unknown.is_near_bound(at, near)
-
-
-def _main(solution: Solution, name: str) -> tuple[Unknown, float]:
-    """Return the unknown that is an effect's main parameter, and where the fit ended."""
+def main_of(problem: Problem, theta: FloatArray, name: str) -> tuple[Unknown, float]:
+    """Return the unknown that is an effect's main parameter, and where theta has it."""
     main = f"{name}.{effect_named(name).main.name}"
-    unknowns = zip(solution.problem.unknowns, solution.theta, strict=True)
-    return next((u, float(t)) for u, t in unknowns if u.name == main)
+    return next((u, float(t)) for u, t in zip(problem.unknowns, theta, strict=True) if u.name == main)
 
 
 def _reweight(solution: Solution, problem: Problem) -> FloatArray:
     """Return the derivatives of a solution in units of the noise of another problem on the same samples."""
     new, old = (p.by_row(lambda case, n: case.noise[n]) for p in (problem, solution.problem))
-    result: FloatArray = solution.jacobian * (old / new)[:, None]
-    return result
+    return solution.jacobian * (old / new)[:, None]

@@ -10,40 +10,15 @@ noise. All numbers are in DiagnosisSettings.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol, TypeVar
 
 import numpy as np
 
+from rsea_ros.diagnosis.candidate import Candidate
 from rsea_ros.diagnosis.result import Reason, Status, Verdict
-from rsea_ros.diagnosis.score import Score, bootstrap_means, likelier_by
+from rsea_ros.diagnosis.score import Score, bootstrap_means, tempered_deviance
 from rsea_ros.diagnosis.settings import DEFAULT, AcceptanceSettings, DiagnosisSettings, FloorSettings
 from rsea_ros.identification.result import silent_channels
 from rsea_ros.records.record import Fault
-
-
-class Scored(Protocol):
-    """The part of a model that the criteria use.
-
-    validation: its score on the validation blocks. parameters: its unknowns. size: numbers that describe its
-    effects. prior_cost: the cost of leaving the known values. is_at_bound: its newest
-    effect has run to a bound.
-    """
-
-    @property
-    def validation(self) -> Score: ...
-    @property
-    def causes(self) -> tuple[str, ...]: ...
-    @property
-    def parameters(self) -> int: ...
-    @property
-    def size(self) -> int: ...
-    @property
-    def prior_cost(self) -> float: ...
-    @property
-    def is_at_bound(self) -> bool: ...
-
-
-M = TypeVar("M", bound=Scored)
 
 
 @dataclass(frozen=True)
@@ -78,12 +53,7 @@ def falls(model: Score, other: Score) -> list[float]:
     return [1.0 - model.ratio(n) / max(other.ratio(n), 1e-12) for n in model.sums]
 
 
-def is_acceptable(model: Scored, current: Scored, settings: DiagnosisSettings = DEFAULT) -> bool:
-    """Return whether a model may take the place of the current one."""
-    return refusal(model, current, settings) is None
-
-
-def refusal(model: Scored, current: Scored, settings: DiagnosisSettings = DEFAULT) -> Reason | None:
+def refusal(model: Candidate, current: Candidate, settings: DiagnosisSettings = DEFAULT) -> Reason | None:
     """Return why a model may not take the place of the current one; None where it may.
 
     An effect at a bound imitates another one. A pair, and one more cause beside several that leave much,
@@ -111,8 +81,8 @@ def refusal(model: Scored, current: Scored, settings: DiagnosisSettings = DEFAUL
 
 
 def break_tie(
-    models: Sequence[M], current: Score, settings: DiagnosisSettings = DEFAULT
-) -> M | None:
+    models: Sequence[Candidate], current: Score, settings: DiagnosisSettings = DEFAULT
+) -> Candidate | None:
     """Return the model to accept.
 
     The best is the likeliest, the cost of leaving known values included. The simplest is accepted of all that
@@ -126,7 +96,7 @@ def break_tie(
     least = min(models, key=lambda m: float(m.validation.loss(current).sum()))
     best = max(models, key=lambda m: likelier_by(m, least, far))
 
-    def contends(m: M) -> bool:
+    def contends(m: Candidate) -> bool:
         if best.size > m.size and keeps_known_values(best, m, settings):
             return False
         over = preference(best.validation, m.validation, rule=settings.acceptance)
@@ -134,13 +104,13 @@ def break_tie(
 
     contenders = [m for m in models if m is best or contends(m)]
 
-    def worth(m: M) -> float:
+    def worth(m: Candidate) -> float:
         return likelier_by(m, best, far) - settings.acceptance.price * m.parameters
 
     return min(contenders, key=lambda m: (m.size, -worth(m)))
 
 
-def is_nearly_as_good(model: Scored, best: Scored, settings: DiagnosisSettings = DEFAULT) -> bool:
+def is_nearly_as_good(model: Candidate, best: Candidate, settings: DiagnosisSettings = DEFAULT) -> bool:
     """Return whether a simpler model does nearly as well as the best, which is far from the floor.
 
     The best one's residual is not noise, and more parameters always fit a little of it.
@@ -151,17 +121,17 @@ def is_nearly_as_good(model: Scored, best: Scored, settings: DiagnosisSettings =
     return _loss(model, best) < room**2 * _loss(best, best)
 
 
-def is_equally_good(model: Scored, other: Scored, settings: DiagnosisSettings = DEFAULT) -> bool:
+def is_equally_good(model: Candidate, other: Candidate, settings: DiagnosisSettings = DEFAULT) -> bool:
     """Return whether a model loses no more than another on the validation blocks, within a tenth."""
     return _loss(model, other) < (1.0 + settings.acceptance.room) * _loss(other, other)
 
 
-def costs_priors_less(model: Scored, other: Scored, settings: DiagnosisSettings = DEFAULT) -> bool:
+def costs_priors_less(model: Candidate, other: Candidate, settings: DiagnosisSettings = DEFAULT) -> bool:
     """Return whether a model that does as well as another leaves the known values clearly less."""
     return model.prior_cost + loss_excess(model, other) < other.prior_cost - settings.acceptance.prior_gain
 
 
-def keeps_known_values(model: Scored, other: Scored, settings: DiagnosisSettings = DEFAULT) -> bool:
+def keeps_known_values(model: Candidate, other: Candidate, settings: DiagnosisSettings = DEFAULT) -> bool:
     """Return whether a model keeps the known values so much better that its further unknowns are paid for."""
     rule = settings.acceptance
     price = rule.prior_gain + rule.price * max(model.parameters - other.parameters, 0)
@@ -169,22 +139,31 @@ def keeps_known_values(model: Scored, other: Scored, settings: DiagnosisSettings
     return min(spared, likelier_by(model, other, settings.floor.far)) > price
 
 
-def is_far_from_floor(model: Scored, settings: DiagnosisSettings = DEFAULT) -> bool:
+def is_far_from_floor(model: Candidate, settings: DiagnosisSettings = DEFAULT) -> bool:
     """Return whether a model is far from the noise floor in its worst channel."""
     return worst_ratio(model) >= settings.floor.far
 
 
-def worst_ratio(model: Scored) -> float:
+def worst_ratio(model: Candidate) -> float:
     """Return the RMS of the residual over the noise in the worst channel."""
     return max(model.validation.ratio(n) for n in model.validation.sums)
 
 
-def loss_excess(model: Scored, best: Scored) -> float:
+def likelier_by(model: Candidate, other: Candidate, far: float) -> float:
+    """Return twice the log of the odds of a model against another.
+
+    far: RMS of the residual over the noise, in the worst channel of both, from which the data are tempered.
+    """
+    gained = tempered_deviance(model.validation, other.validation, far)
+    return gained + other.prior_cost - model.prior_cost
+
+
+def loss_excess(model: Candidate, best: Candidate) -> float:
     """Return how much more a model loses than the best on the validation blocks, in the best's units."""
     return _loss(model, best) - _loss(best, best)
 
 
-def _loss(model: Scored, against: Scored) -> float:
+def _loss(model: Candidate, against: Candidate) -> float:
     return float(model.validation.loss(against.validation).sum())
 
 

@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from rsea_ros.diagnosis.settings import DEFAULT, BlockSettings, DiagnosisSettings
-from rsea_ros.identification.problem import Case
+from rsea_ros.identification.problem import Case, residual_of
 from rsea_ros.model.drive import Drive, SpringStart
 from rsea_ros.records.record import BoolArray, FloatArray, IntArray
 
@@ -49,8 +49,7 @@ def train_starts(case: Case, rule: BlockSettings) -> FloatArray:
 
 def blocks_of(case: Case, channel: str, rule: BlockSettings) -> IntArray:
     """Return the number of the block of each sample of a channel."""
-    length = block_length(case, rule)
-    return np.maximum(np.floor((case.t[channel] - case.start) / length), 0).astype(np.int64)
+    return np.maximum(np.floor((case.t[channel] - case.start) / block_length(case, rule)), 0).astype(np.int64)
 
 
 def part(case: Case, sets: tuple[int, ...], rule: BlockSettings) -> Case:
@@ -86,20 +85,14 @@ def short_pieces_of(
     misfit = np.array([misfit_between(fit, outputs, float(t), length) for t in starts])
     misfit[spread] = -1.0
     worst = np.argsort(misfit)[len(spread) - 2 * half :]
-    chosen = starts[np.sort(np.concatenate([spread, worst]))]
-    begins = [_piece_start(drive, float(t), _RUN_UP) for t in chosen]
-    return tuple(
-        _piece(thinner, drive, k, float(t) + length, _RUN_UP, *_start(case, drive, k, outputs))
-        for k, t in zip(begins, chosen, strict=True)
-    )
-
-
-def _start(
-    case: Case, drive: Drive, k: int, outputs: Mapping[str, FloatArray]
-) -> tuple[tuple[float, float], SpringStart | None]:
-    """Return state and spring at the begin of a step."""
-    t = drive.start + k * drive.step
-    return state_at(case, t, outputs), spring_at(case, t, outputs)
+    chosen = starts[np.sort(np.concatenate([spread, worst]))].tolist()
+    pieces = []
+    for t in chosen:
+        first = run_up_step(drive, t, _RUN_UP)
+        start = drive.start + first * drive.step
+        begin = state_at(case, start, outputs), spring_at(case, start, outputs)
+        pieces.append(_piece(thinner, drive, first, t + length, *begin))
+    return tuple(pieces)
 
 
 def as_often_as_commands(case: Case) -> Case:
@@ -114,8 +107,7 @@ def as_often_as_commands(case: Case) -> Case:
     period = drive.hold * drive.step
     whole = {n for n, known in case.filters.items() if known.is_sampled}
     every = {n: slice(None, None, 1 if n in whole else _samples_in(period, t)) for n, t in case.t.items()}
-    thinner = replace(drive, at={n: at[every[n]] for n, at in drive.at.items()})
-    return case.keep(every, thinner)
+    return case.keep(every, replace(drive, at={n: at[every[n]] for n, at in drive.at.items()}))
 
 
 def _samples_in(period: float, t: FloatArray) -> int:
@@ -134,25 +126,23 @@ def misfit_between(case: Case, outputs: Mapping[str, FloatArray], begin: float, 
     """Return the power of a residual in a piece, each channel over its power in all, summed."""
     total = 0.0
     for n in case.measured.keys() & outputs.keys():
-        power = np.where(case.mask[n], (case.measured[n] - outputs[n]) ** 2, 0.0)
+        power = residual_of(case, outputs, n) ** 2
         t = case.t[n] - case.start
         inside = (t >= begin) & (t < begin + length)
         total += float(power[inside].sum() / max(power.sum(), 1e-300))
     return total
 
 
-def _piece_start(drive: Drive, begin: float, run_up: float) -> int:
-    """Return the step, the first of a command period, with which the run-up of a piece begins."""
-    return int((begin - run_up) / drive.step) // drive.hold * drive.hold
+def run_up_step(drive: Drive, begin: float, run_up: float) -> int:
+    """Return the step, the first of a command period, with which the run-up of a time begins, s."""
+    return max(0, int((begin - run_up) / drive.step) // drive.hold * drive.hold)
 
 
 def _piece(
-    case: Case, drive: Drive, first: int, end: float, run_up: float, state: tuple[float, float],
-    spring: SpringStart | None,
-) -> Case:  # fmt: skip
+    case: Case, drive: Drive, first: int, end: float, state: tuple[float, float], spring: SpringStart | None
+) -> Case:
     """Return the part of a case from a step with a state and a spring to a time since its start, s."""
     last, start = math.ceil(end / drive.step) + 1, drive.start + first * drive.step  # with what follows
-    compared = start + run_up
     inside = {n: (t >= start) & (t < drive.start + end) for n, t in case.t.items()}
     cut = replace(
         drive, start=start, command=drive.command[first:last],
@@ -161,7 +151,7 @@ def _piece(
         origin=drive.origin + first * drive.step, whole=drive.drift_time,
         restarts=tuple((k - first, state) for k, state in drive.restarts if first < k < last), spans=(),
     )
-    return case.within({n: t >= compared for n, t in case.t.items()}).keep(inside, cut)
+    return case.within({n: t >= start + _RUN_UP for n, t in case.t.items()}).keep(inside, cut)
 
 
 _NEAR = 0.03

@@ -10,13 +10,13 @@ from dataclasses import replace
 
 from rsea_ros.checks.carried import check_diagnosable
 from rsea_ros.checks.faults import Checked, check
-from rsea_ros.diagnosis.backward_elimination import eliminate_backwards
-from rsea_ros.diagnosis.candidate import is_apart
+from rsea_ros.diagnosis.candidate import FitSetup, fit_candidate, is_apart
 from rsea_ros.diagnosis.evaluation import Evaluated, Examined, Selection, evaluate, held_out_data
 from rsea_ros.diagnosis.naming.conclusion import conclude
 from rsea_ros.diagnosis.result import Diagnosis
 from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings
-from rsea_ros.diagnosis.stepwise import go_on, select_stepwise
+from rsea_ros.diagnosis.step_fits import StepFits
+from rsea_ros.diagnosis.stepwise import eliminate_backwards, go_on, select_stepwise
 from rsea_ros.diagnosis.stretches import in_stretches, stretches_of
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.effects.effect import Effect
@@ -75,8 +75,8 @@ def _diagnosed(
     start: Rig | None = None,
 ) -> Diagnosis:
     """Diagnose a rig as it is judged. start: a rig whose values the first fit begins with."""
-    checked, remarks = _steady([check(r, rig) for r in records], rig)
-    tested = _steady([check(holdout, rig)], rig)[0][0] if holdout is not None else None
+    checked, remarks = on_steady_clocks([check(r, rig) for r in records], rig)
+    tested = on_steady_clocks([check(holdout, rig)], rig)[0][0] if holdout is not None else None
     examined = Examined(records, checked, tested, rig)
     with worker_pools() as pools:
         nominal = nominal_problem(checked, rig, settings, pools.run)
@@ -192,7 +192,23 @@ def searched_effects(nominal: Problem, without: Collection[str]) -> list[Effect]
     return [e.at(scale) for e in searched if is_apart(e, nominal)]
 
 
-def _steady(checked: Sequence[Checked], rig: Rig) -> tuple[list[Checked], tuple[Remark, ...]]:
+def best_single_effect(record: Record, rig: Rig) -> str:
+    """Return the effect that leaves least when it is fitted alone to the training blocks; empty for none.
+
+    What a search without held-out data would name: screened and fitted on short pieces as in the first step
+    of a diagnosis.
+    """
+    problem = nominal_problem([check(record, rig)], rig)
+    with worker_pools() as pools:
+        current = fit_candidate(FitSetup(problem.cases, DEFAULT, pools.run), problem)
+        effects = searched_effects(problem, ())
+        fits = StepFits(current, effects, pools, DEFAULT, lambda step, share: None)
+        pieces = fits.fit_pieces(fits.screen(fits.on_pieces)[: DEFAULT.forward.piece_fits])
+    best = min(pieces, key=lambda s: s.cost, default=None)
+    return best.name if best else ""
+
+
+def on_steady_clocks(checked: Sequence[Checked], rig: Rig) -> tuple[list[Checked], tuple[Remark, ...]]:
     """Return records on the even clocks that their values agree with, and remarks on the changes."""
     steady = with_even_clocks([c.record for c in checked], [c.masked for c in checked], rig)
     records = zip(checked, steady.records, strict=True)

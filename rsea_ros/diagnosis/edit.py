@@ -7,8 +7,6 @@ worse than before. Beside it stand the model with the cause, and a dense fit of 
 every value fitted and no cause.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -20,11 +20,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from rsea_ros.effects.effect import Effect
-from rsea_ros.effects.guess import Guess
+from rsea_ros.effects.guess import Guess, ResidualView
 from rsea_ros.effects.signal_table import ROTOR_ANGLE, Port
 from rsea_ros.identification.missing_torque import Injector, missing_torque
-from rsea_ros.identification.noise_level import residual_of
-from rsea_ros.identification.problem import Case, Problem
+from rsea_ros.identification.problem import Case, Problem, residual_of
 from rsea_ros.identification.start import LARGEST, torque_size
 from rsea_ros.identification.unknowns import WELL_KNOWN, theta_with
 from rsea_ros.model.drive import Drive
@@ -138,7 +137,7 @@ def torque_along(
     if not channel:
         return None
     t, keep = case.t[channel], case.mask[channel]
-    residual = {n: np.where(case.mask[n], residual_of(case, outputs, n), 0.0) for n in outputs}
+    residual = {n: residual_of(case, outputs, n) for n in outputs}
     injector, period = Injector(rig, case.drive, case.t), float(np.median(np.diff(t)))
     missing = missing_torque(case, residual, injector, period)
     middle = case.drive.start + missing.t + 0.5 * period
@@ -228,7 +227,7 @@ def joint_guesses(effect: Effect, largest: float) -> list[Guess]:
 
 
 @dataclass(frozen=True)
-class RecordView:
+class RecordView(ResidualView):
     """A case beside the rig fitted so far and its simulated channels (effects/guess.py)."""
 
     case: Case
@@ -237,54 +236,43 @@ class RecordView:
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """Names of the simulated channels."""
         return tuple(self.outputs)
 
     @property
     def measured(self) -> frozenset[str]:
-        """Names of the measured channels."""
         return frozenset(self.case.measured)
 
     @property
     def free(self) -> tuple[str, ...]:
-        """Names of the rig's values that a fit may move."""
         return tuple(self.rig.free())
 
     @property
     def rigid_spring(self) -> bool:
-        """Whether the rig has no spring."""
         return self.rig.rigid_spring
 
     @property
     def is_joint(self) -> bool:
-        """Whether the firmware closes a position loop."""
         return self.rig.loop is not None
 
     def value(self, name: str) -> float:
-        """Return a value of the rig as fitted so far, SI."""
         return self.rig[name]
 
     def is_well_known(self, name: str) -> bool:
-        """Return whether the rig's prior of a value is narrow."""
         return self.rig.spread(name) <= WELL_KNOWN
 
     def travel(self) -> float | None:
-        """Return how far the measured position goes, rad; None without that channel."""
         position = self.case.measured.get("position")
         return None if position is None else float(np.ptp(position))
 
     def largest_command(self) -> float | None:
-        """Return the largest commanded torque, N m; None for a record of a measured motion."""
         drive = self.case.drive
         return float(np.max(np.abs(drive.command))) if isinstance(drive, Drive) else None
 
     def largest_motor_torque(self) -> float | None:
-        """Return the largest measured motor torque but for outliers, N m; None without that channel."""
         torque = self.case.measured.get("motor_torque")
         return None if torque is None else float(np.quantile(np.abs(torque), LARGEST))
 
     def largest_unanswered_command(self, share: float) -> float | None:
-        """Return the largest command of which the measured motor torque shows less than a share, N m."""
         case = self.case
         if not isinstance(case.drive, Drive) or "motor_torque" not in case.measured:
             return None
@@ -294,7 +282,6 @@ class RecordView:
         return float(np.max(commanded[case.mask["motor_torque"] & is_silent], initial=0.0))
 
     def gain(self, channel: str) -> float | None:
-        """Return the factor that brings the simulated channel nearest to the measured one; None without."""
         if channel not in self.case.measured:
             return None
         mask = self.case.mask[channel]
@@ -302,7 +289,6 @@ class RecordView:
         return float(simulated @ measured / (simulated @ simulated)) if simulated.any() else None
 
     def lines(self, channel: str, is_sharp: bool) -> list[float]:
-        """Return the highest peaks of a residual's spectrum, Hz. is_sharp: as sharp as the record is long."""
         t, residual = self.case.t[channel], residual_of(self.case, self.outputs, channel)
         rate = 1.0 / float(np.median(np.diff(t)))
         is_whole = not (isinstance(self.case.drive, Drive) and self.case.drive.spans)
@@ -318,16 +304,13 @@ class RecordView:
         return [interpolate_peak(bins, level, k) for k in peaks(level, apart)]
 
     def sine(self, channel: str, frequency: float) -> Guess:
-        """Return amplitude and phase (rad) of the sine of a frequency (Hz) in a residual."""
         t = self.case.t[channel] - self.case.start
         return sine_at(t, residual_of(self.case, self.outputs, channel), 2.0 * math.pi * frequency)
 
     def repeating_torque(self) -> list[Guess]:
-        """Return cycles per revolution, amplitude (N m), phase (rad) of the torque that follows the rotor."""
         return ripples(self.case, self.rig, self.outputs)
 
     def repeating_angle(self) -> list[Guess]:
-        """Return the same of the measured angle's error, amplitude in rad."""
         return angle_errors(self.case, self.rig, self.outputs)
 
 

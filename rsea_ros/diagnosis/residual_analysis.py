@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rsea_ros.diagnosis.result import Misfit, Spectrum
-from rsea_ros.identification.problem import Case
+from rsea_ros.identification.problem import Case, residual_of
 from rsea_ros.model.drive import Drive
 from rsea_ros.model.rig import Rig
 from rsea_ros.records.record import FloatArray
@@ -29,9 +29,7 @@ def rms_in(edges: FloatArray, values: FloatArray, residual: FloatArray) -> Float
     count = len(edges) - 1
     which = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, count - 1)
     number = np.bincount(which, minlength=count).astype(float)
-    power = np.bincount(which, residual**2, count) / np.where(number > 0.0, number, np.nan)
-    rms: FloatArray = np.sqrt(power)
-    return rms
+    return np.sqrt(np.bincount(which, residual**2, count) / np.where(number > 0.0, number, np.nan))
 
 
 _SHOWN_ABOVE = 1.25
@@ -45,7 +43,7 @@ _MOST = 3
 
 def misfits(case: Case, outputs: dict[str, FloatArray], channel: str, rig: Rig) -> tuple[Misfit, ...]:
     """Return where the residual of a channel is more than its noise, worst first in each respect."""
-    residual = np.where(case.mask[channel], case.measured[channel] - outputs[channel], 0.0)
+    residual = residual_of(case, outputs, channel)
     worst = _worst(by_frequency(case.t[channel], residual, case.noise[channel], channel))
     keep = case.mask[channel]
     for respect in _respects(case, channel, rig):
@@ -74,7 +72,7 @@ def spectrum(
     """Return the residual's amplitude density before and after, with the noise floor's."""
     densities = []
     for outputs in (before, after):
-        residual = np.where(case.mask[channel], case.measured[channel] - outputs[channel], 0.0)
+        residual = residual_of(case, outputs, channel)
         rate, frequency, level = stamped_density(case.t[channel], residual, _SEGMENT)
         densities.append(np.sqrt(level))
     return Spectrum(
@@ -121,5 +119,4 @@ def _level_in_bins(respect: _Respect, residual: FloatArray, noise: float, channe
 
 def _worst(items: list[Misfit]) -> list[Misfit]:
     """Return the worst misfits that are clearly above the noise."""
-    shown = sorted((m for m in items if m.times_noise > _SHOWN_ABOVE), key=lambda m: -m.times_noise)
-    return shown[:_MOST]
+    return sorted((m for m in items if m.times_noise > _SHOWN_ABOVE), key=lambda m: -m.times_noise)[:_MOST]

@@ -15,7 +15,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
@@ -127,8 +126,7 @@ class Score:
         that is larger (maximum likelihood with unknown noise): neither the finest sensor nor the run with
         the least noise dominates the others.
         """
-        scaled = [s / against._units(n) ** 2 for n, s in self.sums.items()]
-        return np.asarray(np.sum(scaled, axis=0))
+        return np.asarray(np.sum([s / against._units(n) ** 2 for n, s in self.sums.items()], axis=0))
 
     @property
     def worst(self) -> str:
@@ -200,8 +198,7 @@ def _by_block(
 
 def bootstrap_means(values: FloatArray, resamples: int = DEFAULT.acceptance.resamples) -> FloatArray:
     """Return the means of resampled blocks, shape (resamples,)."""
-    means: FloatArray = values[_draws(len(values), resamples)].mean(axis=1)
-    return means
+    return np.asarray(values[_draws(len(values), resamples)].mean(axis=1))
 
 
 def gain(
@@ -227,24 +224,6 @@ def gain_of(
 def _draws(blocks: int, resamples: int) -> IntArray:
     """Return which blocks make up each resample, the same in every call, shape (resamples, blocks)."""
     return np.random.default_rng(0).integers(0, blocks, (resamples, blocks))
-
-
-class Weighable(Protocol):
-    """A model with its score on the validation blocks and the cost of leaving known values."""
-
-    @property
-    def validation(self) -> Score: ...
-    @property
-    def prior_cost(self) -> float: ...
-
-
-def likelier_by(model: Weighable, other: Weighable, far: float) -> float:
-    """Return twice the log of the odds of a model against another.
-
-    far: RMS of the residual over the noise, in the worst channel of both, from which the data are tempered.
-    """
-    gained = tempered_deviance(model.validation, other.validation, far)
-    return gained + other.prior_cost - model.prior_cost
 
 
 def tempered_deviance(model: Score, other: Score, far: float) -> float:

@@ -13,17 +13,8 @@ from functools import cached_property
 
 import numpy as np
 
-from rsea_ros.diagnosis.candidate import (
-    Candidate,
-    FitSetup,
-    fit_candidate,
-    in_units_of,
-    is_apart,
-    refit,
-    with_clocks,
-    with_doubled_step,
-    without_clocks,
-)
+from rsea_ros.diagnosis import candidate
+from rsea_ros.diagnosis.candidate import Candidate, FitSetup
 from rsea_ros.diagnosis.criteria import is_equally_good, is_far_from_floor
 from rsea_ros.diagnosis.data_split import short_pieces_of
 from rsea_ros.diagnosis.initial_guess import initial_guesses, stated_starts, view_for
@@ -145,7 +136,7 @@ def _with_present_derivatives(
     step = _Step(problem, np.column_stack([current.jacobian, columns]))
     best = ScreenedEffect(effect, problem, theta, step.cost(theta, residual))
     for _ in range(_STEPS):
-        better = step.take(best, residual, (1.0, _PART))
+        better = step.take(best, residual)
         if better is None:
             break
         best, residual = better
@@ -166,13 +157,11 @@ class _Step:
         """Return the squared residual plus the cost of leaving the priors."""
         return power(residual) + float(np.sum((self._prior * (theta - self._centre)) ** 2))
 
-    def take(
-        self, start: ScreenedEffect, residual: FloatArray, shares: Sequence[float]
-    ) -> tuple[ScreenedEffect, FloatArray] | None:
+    def take(self, start: ScreenedEffect, residual: FloatArray) -> tuple[ScreenedEffect, FloatArray] | None:
         """Return the end of a step, or of a share of it, and its residual; None where none helps."""
         slope = self._matrix.T @ residual + self._prior**2 * (start.theta - self._centre)
         aim = bounded_step(self._problem, start.theta, self._normal, slope)
-        for share in shares:
+        for share in (1.0, _PART):
             theta = start.theta + share * (aim - start.theta)
             stepped = self._problem.residual(theta)
             cost = self.cost(theta, stepped)
@@ -205,13 +194,13 @@ class StepFits:
 
         Near it the clocks stay: without them whatever shifts the response beats the effect that is missing.
         """
-        weighted = in_units_of(self.current.validation, self.current.cases)
+        weighted = candidate.in_units_of(self.current.validation, self.current.cases)
         runs = zip(weighted, self.current.outputs, strict=True)
         cases = tuple(p for case, out in runs for p in short_pieces_of(case, out, self.settings))
         solution = self.current.solution
         problem, theta = replace(solution.problem, cases=cases), solution.theta
         if self.is_far:
-            problem, theta = without_clocks(with_doubled_step(problem), theta)
+            problem, theta = candidate.without_clocks(candidate.with_doubled_step(problem), theta)
         problem = with_unknown_start(problem, theta)
         return solve(problem, theta, iterations=5)
 
@@ -228,7 +217,7 @@ class StepFits:
     def screen(self, solution: Solution) -> list[ScreenedEffect]:
         """Return every other effect after two cheap steps beside a solution, best first."""
         model = solution.problem
-        effects = [e for e in self.effects if e.name not in model.acting and is_apart(e, model)]
+        effects = [e for e in self.effects if e.name not in model.acting and candidate.is_apart(e, model)]
         guesses = self.guesses
 
         def try_effect(i: int) -> ScreenedEffect | None:
@@ -242,10 +231,6 @@ class StepFits:
         """Return the current model on the pieces with an effect of typical size, not fitted."""
         base, effect = self.on_pieces, screened.effect
         return solve(*add_effect(base.problem, base.theta, effect, dict(effect.typical)), iterations=0)
-
-    def with_fitted(self, screened: ScreenedEffect) -> Solution:
-        """Return the model on the pieces with an effect as fitted so far."""
-        return solve(screened.problem, screened.theta, iterations=0)
 
     def fit_pieces(self, screened: Iterable[ScreenedEffect]) -> list[ScreenedEffect]:
         """Fit screened effects to the short pieces."""
@@ -277,7 +262,7 @@ class StepFits:
         problem = replace(screened.problem, cases=self.current.cases)
         theta = screened.theta
         if self.is_far:
-            problem, theta = with_clocks(problem, theta, self.current.problem)
+            problem, theta = candidate.with_clocks(problem, theta, self.current.problem)
         return problem, theta
 
     def _fit_pieces(self, screened: ScreenedEffect) -> ScreenedEffect:
@@ -307,14 +292,15 @@ class StepFits:
 
     def _fit_from(self, problem: Problem, start: FloatArray) -> Candidate:
         """Fit to all training blocks, and again in units of what that leaves."""
-        first = fit_candidate(self._setup, problem, start)
+        first = candidate.fit_candidate(self._setup, problem, start)
         if problem.on_angle:
-            free = fit_candidate(self._setup, replace(problem, on_angle=False), first.solution.theta)
+            on_current = replace(problem, on_angle=False)
+            free = candidate.fit_candidate(self._setup, on_current, first.solution.theta)
             first = free if is_equally_good(free, first, self.settings) else first
         if not self._has_moved(first):
             return first
         is_quick = is_far_from_floor(first, self.settings)
-        return refit(first, replace(self._setup, iterations=FitSetup.iterations, is_quick=is_quick))
+        return candidate.refit(first, replace(self._setup, iterations=FitSetup.iterations, is_quick=is_quick))
 
     @property
     def _setup(self) -> FitSetup:

@@ -16,8 +16,8 @@ from itertools import pairwise
 
 import numpy as np
 
+from rsea_ros.diagnosis import data_split as split
 from rsea_ros.diagnosis.candidate import FitSetup, fit_candidate
-from rsea_ros.diagnosis.data_split import as_often_as_commands, block_length, misfit_between, state_at
 from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.result import Remark
@@ -25,7 +25,7 @@ from rsea_ros.identification.solver import Map
 from rsea_ros.model.drive import LONGEST_STEP, Drive
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.simulation import build
-from rsea_ros.records.record import BoolArray, FloatArray, IntArray
+from rsea_ros.records.record import FloatArray, IntArray
 
 _ROUNDING = 1e-6
 """Of a slot: so much less is a whole one."""
@@ -41,7 +41,7 @@ def in_stretches(problem: Problem, settings: DiagnosisSettings, run: Map) -> Pro
     if _is_whole(problem.cases, settings):
         return problem
     settings = settings_for(problem.rig, settings)
-    thinner = replace(problem, cases=tuple(as_often_as_commands(c) for c in problem.cases))
+    thinner = replace(problem, cases=tuple(split.as_often_as_commands(c) for c in problem.cases))
     if _is_whole(thinner.cases, settings):
         return thinner
     whole = list(zip(thinner.cases, rooms(thinner.cases, settings), strict=True))
@@ -74,7 +74,7 @@ def spread_over(case: Case, rig: Rig, settings: DiagnosisSettings) -> Case:
     if _is_whole([case], settings):
         return case
     settings = settings_for(rig, settings)
-    thinner = as_often_as_commands(case)
+    thinner = split.as_often_as_commands(case)
     (room,) = rooms([thinner], settings)
     return on_slots(thinner, spread_slots(slots_of(thinner, settings), room), settings)
 
@@ -120,12 +120,12 @@ def slot_misfits(case: Case, outputs: Mapping[str, FloatArray], settings: Diagno
     """Return the power of a residual in each slot of a case, each channel over its power in all, summed."""
     length = slot_length(case, settings)
     slots = range(slots_of(case, settings))
-    return np.array([misfit_between(case, outputs, k * length, length) for k in slots])
+    return np.array([split.misfit_between(case, outputs, k * length, length) for k in slots])
 
 
 def slot_length(case: Case, settings: DiagnosisSettings) -> float:
     """Return the length of a slot of a case, s."""
-    return settings.stretches.blocks * block_length(case, settings.blocks)
+    return settings.stretches.blocks * split.block_length(case, settings.blocks)
 
 
 def on_slots(case: Case, slots: Sequence[int] | IntArray, settings: DiagnosisSettings) -> Case:
@@ -136,7 +136,8 @@ def on_slots(case: Case, slots: Sequence[int] | IntArray, settings: DiagnosisSet
     times = [(a * length, b * length) for a, b in _runs(slots)]
     spans = tuple(_span(drive, a, b, settings.stretches.run_up) for a, b in times)
     anew = [(first, _state(case, drive, first)) for first, _ in spans if first > 0]
-    keep = {n: _inside(t - case.start, times) for n, t in case.t.items()}
+    since = {n: t - case.start for n, t in case.t.items()}
+    keep = {n: np.any([(t >= a) & (t < b) for a, b in times], axis=0) for n, t in since.items()}
     cut = replace(
         drive, at={n: at[keep[n]] for n, at in drive.at.items()},
         restarts=tuple(sorted([*drive.restarts, *anew])), spans=spans,
@@ -172,21 +173,16 @@ def _runs(slots: Sequence[int] | IntArray) -> list[tuple[int, int]]:
     """Return first and end of each run of neighbouring slots."""
     slots = [int(k) for k in slots]
     breaks = [i for i, (a, b) in enumerate(pairwise(slots), start=1) if b != a + 1]
-    edges = [0, *breaks, len(slots)]
-    return [(slots[a], slots[b - 1] + 1) for a, b in pairwise(edges)]
+    return [(slots[a], slots[b - 1] + 1) for a, b in pairwise([0, *breaks, len(slots)])]
 
 
 def _span(drive: Drive, begin: float, end: float, run_up: float) -> tuple[int, int]:
     """Return the steps from a run-up before a stretch to a command period behind it."""
-    first = max(0, int((begin - run_up) / drive.step) // drive.hold * drive.hold)
-    return first, min(len(drive.command), math.ceil(end / drive.step) + drive.hold)
+    last = min(len(drive.command), math.ceil(end / drive.step) + drive.hold)
+    return split.run_up_step(drive, begin, run_up), last
 
 
 def _state(case: Case, drive: Drive, first: int) -> tuple[float, float]:
     """Return position (rad) and velocity (rad/s) before a step; the former since the start without a zero."""
-    (position, velocity), (zero, _) = (state_at(case, drive.start + k * drive.step) for k in (first, 0))
+    (position, velocity), (zero, _) = (split.state_at(case, drive.start + k * drive.step) for k in (first, 0))
     return position - zero * ("position" in case.floating), velocity
-
-
-def _inside(t: FloatArray, times: Sequence[tuple[float, float]]) -> BoolArray:
-    return np.asarray(np.any([(t >= a) & (t < b) for a, b in times], axis=0))

@@ -14,7 +14,7 @@ from types import MappingProxyType
 from rsea_ros.documents.units import plain
 from rsea_ros.documents.wording import did_you_mean, quote
 from rsea_ros.effects.effect import Effect, Parameter, without_equation
-from rsea_ros.effects.parameter import powers_of
+from rsea_ros.effects.parameter import POWERS
 from rsea_ros.errors import ParameterError
 from rsea_ros.plugins import plugin_constant, plugin_files
 
@@ -120,7 +120,7 @@ class EffectPage:
     @staticmethod
     def grows_with(parameter: Parameter) -> str:
         """Return with which numbers of the machine bounds and sizes grow, as a fraction; empty for none."""
-        powers = () if parameter.is_fixed else powers_of(parameter.unit)
+        powers = () if parameter.is_fixed else POWERS.get(parameter.unit, ())
         over, under = (
             " ".join(name if abs(k) == 1 else f"{name}^{abs(k)}" for name, k in powers if k * side > 0)
             for side in (1, -1)

@@ -120,12 +120,12 @@ class Scale:
 
     def factor(self, unit: str) -> float:
         """Return by how much a number of a unit is larger; 1 for a unit that says nothing of the machine."""
-        powers, most = _POWERS.get(unit, ()), widest(unit)
+        powers, most = POWERS.get(unit, ()), widest(unit)
         factor = math.prod(float(getattr(self, name)) ** power for name, power in powers)
         return min(max(factor, 1.0 / most), most)
 
 
-_POWERS: dict[str, tuple[tuple[str, int], ...]] = {
+POWERS: dict[str, tuple[tuple[str, int], ...]] = {
     "N m": (("torque", 1),),
     "1/(N m)": (("torque", -1),),
     "N m/rad": (("stiffness", 1),),
@@ -161,14 +161,9 @@ def scale_to(torque: float, stiffness: float, inertia: float, speed: float, peri
     return Scale(**{n: _on_grid(a / b) for n, a, b in zip(names, sizes, beside, strict=True)})
 
 
-def powers_of(unit: str) -> tuple[tuple[str, int], ...]:
-    """Return with which numbers of a machine, to which power, a number of a unit grows."""
-    return _POWERS.get(unit, ())
-
-
 def widest(unit: str) -> float:
     """Return how many times larger a number of a unit may be on any machine than on the catalogue's."""
-    return _WIDEST.get(unit, _GRID**_MOST) if unit in _POWERS else 1.0
+    return _WIDEST.get(unit, _GRID**_MOST) if unit in POWERS else 1.0
 
 
 def _on_grid(ratio: float) -> float:

@@ -8,8 +8,7 @@ from rsea_ros.checks.carried import check_diagnosable, require_motion, with_faul
 from rsea_ros.checks.check import check_record
 from rsea_ros.checks.faults import check
 from rsea_ros.checks.stamp_findings import command_band
-from rsea_ros.diagnosis.diagnose import diagnose
-from rsea_ros.diagnosis.single_effect import best_single_effect
+from rsea_ros.diagnosis.diagnose import best_single_effect, diagnose
 from rsea_ros.identification.identify import identify
 from rsea_ros.identification.result import ParameterEstimate
 from rsea_ros.identification.solver import on_cores

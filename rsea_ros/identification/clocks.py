@@ -97,8 +97,7 @@ def _lags(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return middle (s since start), lag (s) and weight of the blocks that show a lag."""
     slope = np.gradient(p, t)
-    since, lags, weight = [], [], []
-    lag, last = 0.0, 0
+    lag, last, shown = 0.0, 0, []
     edges = np.searchsorted(t, np.arange(t[0], t[-1] + BLOCK, BLOCK))
     for k, (a, b) in enumerate(pairwise(edges.tolist())):
         if b - a < _FEWEST_SAMPLES:
@@ -106,10 +105,9 @@ def _lags(
         at, share = _lag_of(t[a:b], y[a:b], (t, p, slope), lag, _FARTHEST * (k + 1 - last))
         if share > _ALIKE:
             lag, last = at, k + 1
-            since.append(float(np.mean(t[a:b])) - start)
-            lags.append(lag)
-            weight.append(float(np.sum(slope[a:b] ** 2)))
-    return np.array(since), np.array(lags), np.array(weight)
+            shown.append((float(np.mean(t[a:b])) - start, lag, float(np.sum(slope[a:b] ** 2))))
+    since, lags, weight = np.ascontiguousarray(np.array(shown).reshape(-1, 3).T)
+    return since, lags, weight
 
 
 def _lag_of(
@@ -313,8 +311,7 @@ def _columns(solution: Solution) -> dict[str, FloatArray]:
     problem = solution.problem
     measured = [n for n in problem.channels if any(n in case.measured for case in problem.cases)]
     timed = [n for n in measured if n != "motor_torque"]
-    columns = clock_columns(problem, solution.theta, clocks(timed, problem.rig))
-    return dict(zip(timed, columns.T, strict=True))
+    return dict(zip(timed, clock_columns(problem, solution.theta, clocks(timed, problem.rig)).T, strict=True))
 
 
 def _doubts(stamped: Record, even: Record) -> list[tuple[tuple[str, ...], float]]:

@@ -14,15 +14,8 @@ from pathlib import PurePath
 import numpy as np
 
 from rsea_ros.documents.units import in_motion, with_unit
+from rsea_ros.identification import result as results
 from rsea_ros.identification.problem import Case, Problem
-from rsea_ros.identification.result import (
-    CLOCKS,
-    IDENTIFIABLE_SHARE,
-    Overlay,
-    ParameterEstimate,
-    Remark,
-    shares_from_data,
-)
 from rsea_ros.identification.solver import Map, Solution, central_jacobian, serial
 from rsea_ros.identification.unknowns import Unknown, apply
 from rsea_ros.model.drive import Drive
@@ -57,8 +50,7 @@ class Confidence:
         """Return the correlation matrix; a value without doubt is correlated with none."""
         sd = np.sqrt(np.diag(self.covariance))
         scale = np.outer(sd, sd)
-        result: FloatArray = np.divide(self.covariance, scale, out=np.eye(len(sd)), where=scale > 0.0)
-        return result
+        return np.asarray(np.divide(self.covariance, scale, out=np.eye(len(sd)), where=scale > 0.0))
 
 
 BLOCK = 1.0
@@ -83,7 +75,7 @@ def confidence_of(solution: Solution, run: Map = serial) -> Confidence:
     least = np.minimum(least, np.maximum(np.diag(inverse), doubt**2))
     larger = np.sqrt(np.maximum(1.0, least / np.maximum(np.diag(covariance), 1e-300)))
     covariance = covariance * np.outer(larger, larger)
-    return Confidence(solution.theta, covariance, shares_from_data(information, doubt), information)
+    return Confidence(solution.theta, covariance, results.shares_from_data(information, doubt), information)
 
 
 def inverse_of(matrix: FloatArray) -> FloatArray:
@@ -96,8 +88,7 @@ def inverse_of(matrix: FloatArray) -> FloatArray:
     scale = 1.0 / np.sqrt(np.diag(matrix))
     values, vectors = np.linalg.eigh(matrix * np.outer(scale, scale))
     values = np.maximum(values, len(values) * np.finfo(float).eps * values[-1])
-    result: FloatArray = (vectors / values) @ vectors.T * np.outer(scale, scale)
-    return result
+    return np.asarray((vectors / values) @ vectors.T * np.outer(scale, scale))
 
 
 def _alike(case: Case) -> float:
@@ -112,8 +103,7 @@ def _block_scores(solution: Solution) -> FloatArray:
     scores = sum_by_block(solution.jacobian, solution.residual, blocks)
     counted = len(np.unique(blocks))
     free = max(counted - len(solution.theta), counted / _MOST_CORRECTED)
-    result: FloatArray = scores * np.sqrt(counted / free)
-    return result
+    return np.asarray(scores * np.sqrt(counted / free))
 
 
 def sum_by_block(matrix: FloatArray, residual: FloatArray, blocks: IntArray) -> FloatArray:
@@ -140,7 +130,7 @@ def interval(unknown: Unknown, coordinate: float, sd: float) -> tuple[float, flo
     return unknown.outer(coordinate - Z95 * sd), unknown.outer(coordinate + Z95 * sd)
 
 
-def undetermined_remarks(unknowns: Sequence[Unknown], confidence: Confidence) -> tuple[Remark, ...]:
+def undetermined_remarks(unknowns: Sequence[Unknown], confidence: Confidence) -> tuple[results.Remark, ...]:
     """Return remarks on values that the data cannot determine.
 
     The eigenvectors of the data's information, in units of the prior, whose information is less than the
@@ -150,10 +140,8 @@ def undetermined_remarks(unknowns: Sequence[Unknown], confidence: Confidence) ->
     asked = [i for i, u in enumerate(unknowns) if not u.is_clock]
     stuck = [i for i in asked if unknowns[i].at_bound(float(theta[i]))]
     index = [i for i in asked if i not in stuck]
-    remarks = [Remark("at_bound", (u.name,), (u.outer(float(theta[i])),), u.unit)
+    remarks = [results.Remark("at_bound", (u.name,), (u.outer(float(theta[i])),), u.unit)
                for i, u in enumerate(unknowns) if i in stuck]  # fmt: skip
-    if not index:
-        return tuple(remarks)
     reach = np.array([unknowns[i].reach for i in index])
     pairs = [(unknowns[i], abs(float(theta[i]))) for i in index]  # near 0 a typical size is the reference
     size = np.array([1.0 if u.logarithmic else max(value, 0.1 * u.scale) for u, value in pairs])
@@ -166,7 +154,7 @@ def undetermined_remarks(unknowns: Sequence[Unknown], confidence: Confidence) ->
     return tuple(remarks)
 
 
-def torque_scale(problem: Problem) -> tuple[Remark, ...]:
+def torque_scale(problem: Problem) -> tuple[results.Remark, ...]:
     """Return a remark on the basis of every torque without an F/T sensor, where no fit needs one.
 
     The motor's torque is its current times a constant, which it cannot determine.
@@ -174,10 +162,11 @@ def torque_scale(problem: Problem) -> tuple[Remark, ...]:
     fitted = any(u.name.startswith("torque_constant_error.") for u in problem.unknowns)
     if fitted or any("ft" in case.measured for case in problem.cases):
         return ()
-    return (Remark("torque_by_motor_constant" if problem.rig.loop is None else "torque_by_loop_gains"),)
+    by_constant = problem.rig.loop is None
+    return (results.Remark("torque_by_motor_constant" if by_constant else "torque_by_loop_gains"),)
 
 
-def stated_differences(problem: Problem) -> tuple[Remark, ...]:
+def stated_differences(problem: Problem) -> tuple[results.Remark, ...]:
     """Return a remark for each record that differs as stated, and one on conditions of other records."""
     here = {PurePath(case.source).name for case in problem.cases}
     others = tuple(c.record for c in problem.rig.conditions if c.record not in here)
@@ -188,29 +177,25 @@ def stated_differences(problem: Problem) -> tuple[Remark, ...]:
         told = [f"{how} {with_unit(f'{v:.4g}', FIELDS[n].unit)}" for how, (n, v) in known.items()]
         told += [f"{n} fitted for it alone" for n, q in c.values.items() if q.spread]
         told += [f"no {name}" for name in sorted(c.without)]
-        remarks += [Remark("differs", (c.record, *told))] if told else []
-    return (*remarks, *([Remark("other_records", others)] if others else []))
+        remarks += [results.Remark("differs", (c.record, *told))] if told else []
+    return (*remarks, *([results.Remark("other_records", others)] if others else []))
 
 
 def _without_the_rest(information: FloatArray, index: Sequence[int]) -> FloatArray:
     """Return the information on `index` with all other unknowns free (Schur complement)."""
     rest = [i for i in range(len(information)) if i not in index]
     chosen, cross = information[np.ix_(index, index)], information[np.ix_(index, rest)]
-    if not rest:
-        return chosen
-    result: FloatArray = (
-        chosen - cross @ np.linalg.pinv(information[np.ix_(rest, rest)], hermitian=True) @ cross.T
-    )
-    return result
+    inverse = np.linalg.pinv(information[np.ix_(rest, rest)], hermitian=True)
+    return np.asarray(chosen - cross @ inverse @ cross.T)
 
 
-def _remark(unknowns: Sequence[Unknown], moved: FloatArray) -> Remark:
+def _remark(unknowns: Sequence[Unknown], moved: FloatArray) -> results.Remark:
     """Return the remark on unknowns that are undetermined together. moved: relative change of each."""
     names = tuple(u.name for u in unknowns)
     if len(names) == 1:
-        return Remark("only_prior" if np.isfinite(unknowns[0].doubt) else "not_shown", names)
+        return results.Remark("only_prior" if np.isfinite(unknowns[0].doubt) else "not_shown", names)
     share_a_factor = all(field_of(name) in FIELDS for name in names) and moved.min() > _ALIKE * moved.max()
-    return Remark("only_ratios" if share_a_factor else "only_together", names)
+    return results.Remark("only_ratios" if share_a_factor else "only_together", names)
 
 
 def errors_by_channel(
@@ -227,11 +212,11 @@ def errors_by_channel(
     }
 
 
-def parameters_of(solution: Solution, confidence: Confidence) -> tuple[ParameterEstimate, ...]:
+def parameters_of(solution: Solution, confidence: Confidence) -> tuple[results.ParameterEstimate, ...]:
     """Return the estimates of a fit with their 95 % intervals."""
     sd = np.sqrt(np.diag(confidence.covariance))
     return tuple(
-        ParameterEstimate(
+        results.ParameterEstimate(
             name=u.name, value=u.outer(float(theta)),
             unit=in_motion(u.unit, linear=solution.problem.rig.linear),
             ci95=interval(u, float(theta), float(s)), start=u.start, spread=u.spread,
@@ -243,7 +228,7 @@ def parameters_of(solution: Solution, confidence: Confidence) -> tuple[Parameter
     )
 
 
-def identified_rig(solution: Solution, parameters: Sequence[ParameterEstimate]) -> Rig:
+def identified_rig(solution: Solution, parameters: Sequence[results.ParameterEstimate]) -> Rig:
     """Return the rig with the fitted values, their intervals, and their doubt as the next fit's spread."""
     rig, clocks = apply(solution.problem.rig, solution.problem.unknowns, solution.theta)
     sensors = {
@@ -263,9 +248,9 @@ def identified_rig(solution: Solution, parameters: Sequence[ParameterEstimate]) 
     return replace(rig, quantities=known(rig.quantities), sensors=sensors, conditions=conditions)
 
 
-def overlays_of(case: Case, outputs: Mapping[str, FloatArray]) -> tuple[Overlay, ...]:
+def overlays_of(case: Case, outputs: Mapping[str, FloatArray]) -> tuple[results.Overlay, ...]:
     """Return measured beside simulated for every channel of a case."""
-    return tuple(Overlay(n, case.t[n], case.measured[n], outputs[n]) for n in outputs)
+    return tuple(results.Overlay(n, case.t[n], case.measured[n], outputs[n]) for n in outputs)
 
 
 FAR = 3.0
@@ -279,14 +264,14 @@ def is_off_rig(solution: Solution) -> bool:
     return any(field_of(u.name) in stated and u.sigmas(float(t)) > FAR for u, t in unknowns)
 
 
-def off_rig(parameters: Iterable[ParameterEstimate]) -> tuple[Remark, ...]:
+def off_rig(parameters: Iterable[results.ParameterEstimate]) -> tuple[results.Remark, ...]:
     """Return a remark for each value that is surely not the rig's: far off, and determined by the data.
 
     Beside a misfit it has no interval, NaN.
     """
-    off = (p for p in parameters if abs(p.spreads_off) > FAR and p.told_by_data >= IDENTIFIABLE_SHARE)
+    off = (p for p in parameters if abs(p.spreads_off) > FAR and p.told_by_data >= results.IDENTIFIABLE_SHARE)
     told = ((p, (math.nan, math.nan) if p.beside_misfit else p.ci95) for p in off)
     return tuple(
-        Remark("off_rig", (p.name,), (p.start, p.value, *ci95, p.spreads_off), p.unit)
-        for p, ci95 in told if not p.name.startswith(CLOCKS)
+        results.Remark("off_rig", (p.name,), (p.start, p.value, *ci95, p.spreads_off), p.unit)
+        for p, ci95 in told if not p.name.startswith(results.CLOCKS)
     )  # fmt: skip

@@ -91,8 +91,7 @@ def steps(settings: ExcitationSettings) -> FloatArray:
     """Return steps 0, A, 0, -A, each held for a quarter of `period`."""
     quarter = np.floor(np.arange(settings.samples) / settings.rate * 4.0 / settings.period + 1e-9)
     levels = np.array([0.0, settings.amplitude, 0.0, -settings.amplitude])
-    held: FloatArray = levels[quarter.astype(np.int64) % 4]
-    return held
+    return levels[quarter.astype(np.int64) % 4]
 
 
 def multisine(settings: ExcitationSettings) -> FloatArray:
@@ -110,8 +109,7 @@ def multisine(settings: ExcitationSettings) -> FloatArray:
     phases = np.random.default_rng([settings.seed, 1]).uniform(0.0, 2.0 * np.pi, len(lines))
     spectrum[lines] = np.exp(1j * phases)
     period = np.fft.irfft(spectrum, size) * size * settings.amplitude / math.sqrt(2.0 * len(lines))
-    whole: FloatArray = np.tile(period, settings.samples // size)
-    return whole
+    return np.tile(period, settings.samples // size)
 
 
 def odd_lines(settings: ExcitationSettings) -> IntArray:
@@ -157,8 +155,7 @@ def _band_noise(settings: ExcitationSettings, deviation: float) -> FloatArray:
         )
     spectrum[~inside] = 0.0
     share = 2.0 * np.count_nonzero(inside) / n
-    noise: FloatArray = np.fft.irfft(spectrum, n) * (deviation / math.sqrt(share))
-    return noise
+    return np.fft.irfft(spectrum, n) * (deviation / math.sqrt(share))
 
 
 KINDS = {"chirp": chirp, "multisine": multisine, "white_noise": white_noise, "steps": steps}

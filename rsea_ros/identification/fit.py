@@ -23,14 +23,7 @@ from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.effects.effect import Effect
 from rsea_ros.effects.parameter import Scale
 from rsea_ros.errors import RseaError
-from rsea_ros.identification.clocks import (
-    MISFIT,
-    RequiredClocks,
-    free_clocks,
-    required_clocks,
-    with_drifts,
-    without_needless,
-)
+from rsea_ros.identification import clocks as timing
 from rsea_ros.identification.confidence import Confidence, confidence_of, interval
 from rsea_ros.identification.noise_level import reestimate_noise
 from rsea_ros.identification.problem import Case, Problem, case_from, weighted_residual, with_noise_along
@@ -88,7 +81,7 @@ _OTHER_NOISE = 1.1
 
 def fit(
     cases: Sequence[Case], rig: Rig, run: Map = serial, start: Rig | None = None
-) -> tuple[Solution, tuple[Case, ...], RequiredClocks]:
+) -> tuple[Solution, tuple[Case, ...], timing.RequiredClocks]:
     """Fit the rig's free values, its effects and the clocks that the data require.
 
     Returns also the cases with their noise, and the result of the clock tests.
@@ -106,34 +99,35 @@ def fit(
         start = apply(rig, rest.unknowns, first.theta)[0]
     begin = _better_start(problem, start, run)
     solution = solve(*settled_starts(problem, begin, run), run=run)
-    problem = solution.problem
-    outputs = problem.outputs(solution.theta)
-    known = with_noise_of(problem.cases, solution, outputs)
+    outputs, known = _with_noise(solution)
     changes = [b.noise[n] / a.noise[n] for a, b in zip(cases, known, strict=True) for n in a.noise]
     if not all(1.0 / _OTHER_NOISE < change < _OTHER_NOISE for change in changes):
-        solution = solve(replace(problem, cases=known), solution.theta, run=run)
-        outputs = problem.outputs(solution.theta)
-        known = with_noise_of(solution.problem.cases, solution, outputs)
-    drifting = with_drifts(solution, run)
+        solution = solve(replace(solution.problem, cases=known), solution.theta, run=run)
+        outputs, known = _with_noise(solution)
+    drifting = timing.with_drifts(solution, run)
     if drifting is not solution:
-        solution, problem = drifting, drifting.problem
-        outputs = problem.outputs(solution.theta)
-        known = with_noise_of(problem.cases, solution, outputs)
-    required = required_clocks(solution)
+        solution = drifting
+        outputs, known = _with_noise(solution)
+    required = timing.required_clocks(solution)
     if required.clocks:
-        solution = solve(*free_clocks(solution, required), run=run)
-        solution = solve(*without_needless(solution), run=run)
-        problem = solution.problem
-        outputs = problem.outputs(solution.theta)
-        known = with_noise_of(problem.cases, solution, outputs)
+        solution = solve(*timing.free_clocks(solution, required), run=run)
+        solution = solve(*timing.without_needless(solution), run=run)
+        outputs, known = _with_noise(solution)
+    problem = solution.problem
     for _ in range(_REWEIGHTINGS):
         ratios = ratios_of(problem, solution.problem.cases, outputs)
-        if max(ratios.values()) < MISFIT:
+        if max(ratios.values()) < timing.MISFIT:
             break
         cases = tuple(reweight(c, ratios) for c in solution.problem.cases)
         solution = solve(replace(problem, cases=cases), solution.theta, run=run)
         outputs = problem.outputs(solution.theta)
     return solution, known, required
+
+
+def _with_noise(solution: Solution) -> tuple[list[dict[str, FloatArray]], tuple[Case, ...]]:
+    """Return the outputs of a solution, and its cases with the noise that its residual shows."""
+    outputs = solution.problem.outputs(solution.theta)
+    return outputs, with_noise_of(solution.problem.cases, solution, outputs)
 
 
 def with_noise_of(

@@ -107,15 +107,13 @@ def _length(aligned: lpm.Aligned) -> int:
 def _starts(aligned: lpm.Aligned, length: int) -> IntArray:
     starts = np.arange(0, len(aligned.command) - length + 1, length // 2)
     missing = np.concatenate([[0], np.cumsum(~aligned.measured)])
-    whole: IntArray = starts[missing[starts + length] == missing[starts]]
-    return whole
+    return np.asarray(starts[missing[starts + length] == missing[starts]])
 
 
 def _segments(values: FloatArray, starts: IntArray, length: int) -> ComplexArray:
     """Return the windowed spectra, shape (segments, lines)."""
     windows = np.lib.stride_tricks.sliding_window_view(lpm.detrend(values), length)[starts]
-    spectra: ComplexArray = rfft(windows * hann(length), axis=1)
-    return spectra
+    return rfft(windows * hann(length), axis=1)
 
 
 _ORDERS = np.arange(1, 5)
@@ -151,15 +149,13 @@ def sampled_integrators(x: FloatArray, offset: float) -> ComplexArray:
     w = np.exp(-2j * np.pi * x)
     sums = np.array([polyval(w, c) / (1.0 - w) ** (j + 1) for j, c in enumerate(_EULERIAN)])
     terms = [_shifted_power(sums, int(p), rest) / _FACTORIALS[p] for p in _ORDERS]
-    sampled: ComplexArray = np.array(terms) * (1.0 - w) * w ** (-whole) * np.exp(-2j * np.pi * x * offset)
-    return sampled
+    return np.asarray(np.array(terms) * (1.0 - w) * w ** (-whole) * np.exp(-2j * np.pi * x * offset))
 
 
 def _shifted_power(sums: ComplexArray, p: int, d: float) -> ComplexArray:
     """Return sum_n (n + d)^p w^n from sum_n n^j w^n, by the binomial theorem."""
     factors = [_FACTORIALS[p] / (_FACTORIALS[j] * _FACTORIALS[p - j]) * d ** (p - j) for j in range(p + 1)]
-    total: ComplexArray = np.tensordot(factors, sums[: p + 1], axes=1)
-    return total
+    return np.tensordot(factors, sums[: p + 1], axes=1)
 
 
 def _fold(x: FloatArray, measured: ComplexArray, sd: FloatArray, offsets: FloatArray) -> ComplexArray:
@@ -170,8 +166,7 @@ def _fold(x: FloatArray, measured: ComplexArray, sd: FloatArray, offsets: FloatA
     lines = lines[:: max(1, len(lines) // _FITTED_LINES)]
     delay, markov = _fit(x[lines], measured[lines], sd[lines], offsets)
     wanted = _hold(x) / (2j * np.pi * x) ** _ORDERS[:, None] * np.exp(-2j * np.pi * x * delay)
-    folded: ComplexArray = markov @ (_basis(x, offsets, delay) - wanted)
-    return folded
+    return np.asarray(markov @ (_basis(x, offsets, delay) - wanted))
 
 
 def _fit(
@@ -192,13 +187,11 @@ def _fit(
 def _basis(x: FloatArray, offsets: FloatArray, delay: float) -> ComplexArray:
     """Return the sampled integrators, late by `delay` periods, averaged over the offsets of the samples."""
     sampled = [sampled_integrators(x, float(d) - delay) for d in offsets]
-    basis: ComplexArray = np.mean(sampled, axis=0) * np.exp(-2j * np.pi * x * delay)
-    return basis
+    return np.asarray(np.mean(sampled, axis=0) * np.exp(-2j * np.pi * x * delay))
 
 
 def _hold(x: FloatArray) -> ComplexArray:
-    hold: ComplexArray = np.sinc(x) * np.exp(-1j * np.pi * x)
-    return hold
+    return np.asarray(np.sinc(x) * np.exp(-1j * np.pi * x))
 
 
 def _real(values: ComplexArray) -> FloatArray:
@@ -322,8 +315,7 @@ def _levels(mean_y: ComplexArray, variance: FloatArray, excited: IntArray, lengt
         if len(at) < _SMOOTHED:
             return None
         beyond = _smooth(np.abs(mean_y[at]) ** 2 - variance[at])
-        result: FloatArray = rms * np.sqrt(np.maximum(np.interp(excited, at, beyond), 0.0))
-        return result
+        return np.asarray(rms * np.sqrt(np.maximum(np.interp(excited, at, beyond), 0.0)))
 
     noise = np.interp(excited, lines, _smooth(variance[lines]))
     return Distortion(rms * np.sqrt(noise), level(silent[silent % 2 == 0]), level(silent[silent % 2 == 1]))
@@ -334,8 +326,7 @@ def _smooth(values: FloatArray) -> FloatArray:
     if len(values) < _SMOOTHED:
         return np.full(len(values), values.mean())
     padded = np.pad(values, _SMOOTHED // 2, mode="edge")
-    smooth: FloatArray = np.convolve(padded, np.full(_SMOOTHED, 1.0 / _SMOOTHED), mode="valid")
-    return smooth
+    return np.convolve(padded, np.full(_SMOOTHED, 1.0 / _SMOOTHED), mode="valid")
 
 
 UNFILTERED = Sensor()
@@ -364,11 +355,7 @@ def estimate_response(record: Record, output: str, sensor: Sensor = UNFILTERED) 
         sampled = known.response(lines.frequency, period)
     response, sd = unfold(aligned, lines.frequency, lines.response / sampled, lines.sd / np.abs(sampled))
     response, sd = response * sampled / passed, sd * np.abs(sampled / passed)
-    return FrequencyResponse(
-        input="command", output=output, frequency=lines.frequency, response=response,
-        coherence=lines.coherence, sd=sd, method=lines.method, noise=lines.noise,
-        distortion=lines.distortion,
-    )
+    return FrequencyResponse("command", output, **{**vars(lines), "response": response, "sd": sd})
 
 
 def responses_of(record: Record, rig: Rig) -> tuple[FrequencyResponse, ...]:
@@ -412,9 +399,8 @@ def model_responses(rig: Rig, frequencies: Mapping[str, FloatArray]) -> dict[str
 
 def _output_row(rig: Rig, output: str, m: Mechanics) -> FloatArray:
     if output == "ft":
-        return rig["spring.stiffness"] * read_row(rig, m, st.DEFLECTION) + rig["spring.damping"] * read_row(
-            rig, m, st.DEFLECTION_RATE
-        )
+        deflection, rate = (read_row(rig, m, signal) for signal in (st.DEFLECTION, st.DEFLECTION_RATE))
+        return rig["spring.stiffness"] * deflection + rig["spring.damping"] * rate
     if output == "deflection":
         return read_row(rig, m, st.DEFLECTION)
     return encoder_row(rig, m, is_rate=output == "velocity")

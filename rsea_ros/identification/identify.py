@@ -11,39 +11,10 @@ from dataclasses import replace
 import numpy as np
 
 from rsea_ros.errors import IdentificationError
+from rsea_ros.identification import confidence as conf, fit as fits, result as results
 from rsea_ros.identification.clocks import with_even_clocks
-from rsea_ros.identification.confidence import (
-    Confidence,
-    confidence_of,
-    errors_by_channel,
-    identified_rig,
-    off_rig,
-    overlays_of,
-    parameters_of,
-    stated_differences,
-    torque_scale,
-    undetermined_remarks,
-)
-from rsea_ros.identification.fit import (
-    Evened,
-    ExtendedFit,
-    alternatives,
-    as_recorded,
-    even_out,
-    fit,
-    ratios_of,
-    span_all,
-)
 from rsea_ros.identification.frequency_response import model_response, responses_of
 from rsea_ros.identification.problem import Case, case_from
-from rsea_ros.identification.result import (
-    AT_NOISE,
-    FAR_FROM_NOISE,
-    FrequencyResponse,
-    Identification,
-    Overlay,
-    statics_of,
-)
 from rsea_ros.identification.solver import Solution, worker_pools
 from rsea_ros.identification.start import joint_start, start_from
 from rsea_ros.model.extent import LARGEST, bound_values
@@ -92,19 +63,19 @@ _TIMES = 1.5
 """RMS behind gaps over that elsewhere, from which the gaps made it: twice what chance makes of ten gaps."""
 
 
-def explained_by_lost_cycles(identification: Identification) -> int:
+def explained_by_lost_cycles(identification: results.Identification) -> int:
     """Return how many lost cycles are the likely cause of a misfit; 0 for another, and without misfit."""
     return 0 if identification.at_noise else lost_behind(identification.faults, identification.overlays)
 
 
-def lost_behind(faults: Sequence[Fault], overlays: Sequence[Overlay]) -> int:
+def lost_behind(faults: Sequence[Fault], overlays: Sequence[results.Overlay]) -> int:
     """Return how many cycles were lost, if the motor torque of a misfit shows them; otherwise 0."""
     lost = round(sum(f.size or 0.0 for f in faults if f.kind == KIND))
     torque = next((o for o in overlays if o.channel == "motor_torque"), None)
     return lost if lost and torque is not None and rises_behind_gaps(torque) else 0
 
 
-def rises_behind_gaps(overlay: Overlay) -> bool:
+def rises_behind_gaps(overlay: results.Overlay) -> bool:
     """Return whether the residual is larger in the first sample behind a gap than in the others."""
     if len(overlay.t) < 2:
         return False
@@ -119,7 +90,7 @@ def rises_behind_gaps(overlay: Overlay) -> bool:
 
 def identify(
     records: Sequence[Record], rig: Rig, progress: Progress | None = None, *, of_misfit: bool = True
-) -> Identification:
+) -> results.Identification:
     """Return the parameters of the rig, effects that it lists included, with their confidence.
 
     of_misfit: whether laws that would explain a misfit are fitted, too, and widen the intervals. Raises
@@ -132,7 +103,7 @@ def identify(
         check_usable(record)
     records = [bound_values(record) for record in records]
     check_excited(records)
-    rig, unseen = as_recorded(rig, records)
+    rig, unseen = fits.as_recorded(rig, records)
     cases = tuple(case_from(record, rig) for record in records)
     report("frequency responses", 0.2)
     responses = responses_of(records[0], rig)
@@ -141,17 +112,18 @@ def identify(
         start = None
         if not is_inverse(rig) and rig.condition(records[0].source) is None:
             start = start_from(responses, rig) if rig.loop is None else joint_start(records[0], rig)
-        solution, cases, required = fit(cases, rig, run=pools.run, start=start)
-        steady, misfits = Evened(tuple(records), {}), _misfits(solution, cases)
-        while misfits and (more := even_out(steady.records, rig, solution)).scatter:
-            steady = Evened(more.records, {**steady.scatter, **more.scatter})
+        solution, cases, required = fits.fit(cases, rig, run=pools.run, start=start)
+        steady, misfits = fits.Evened(tuple(records), {}), _misfits(solution, cases)
+        while misfits and (more := fits.even_out(steady.records, rig, solution)).scatter:
+            steady = fits.Evened(more.records, {**steady.scatter, **more.scatter})
             cases = tuple(case_from(record, rig) for record in steady.records)
-            solution, cases, required = fit(cases, rig, run=pools.run, start=identified_rig(solution, ()))
+            start = conf.identified_rig(solution, ())
+            solution, cases, required = fits.fit(cases, rig, run=pools.run, start=start)
             misfits = _misfits(solution, cases)
         report("confidence", 0.8)
         outputs = solution.problem.outputs(solution.theta)
-        others = alternatives(solution, cases, pools) if misfits and of_misfit else ()
-        doubt = confidence_of(solution, pools.run)
+        others = fits.alternatives(solution, cases, pools) if misfits and of_misfit else ()
+        doubt = conf.confidence_of(solution, pools.run)
     confidence = with_even_clocks(doubt, solution, records, steady.records)
     result = _result(solution, outputs, records, cases, responses, others, confidence)
     report("done", 1.0)
@@ -161,25 +133,26 @@ def identify(
 def _misfits(solution: Solution, cases: Sequence[Case]) -> bool:
     """Return whether a solution leaves more than the noise of its cases."""
     outputs = solution.problem.outputs(solution.theta)
-    return max(ratios_of(solution.problem, cases, outputs).values()) > AT_NOISE
+    return max(fits.ratios_of(solution.problem, cases, outputs).values()) > results.AT_NOISE
 
 
 def _result(
     solution: Solution, outputs: Sequence[dict[str, FloatArray]], records: Sequence[Record],
-    cases: Sequence[Case], responses: tuple[FrequencyResponse, ...], others: Sequence[ExtendedFit],
-    confidence: Confidence,
-) -> Identification:  # fmt: skip
+    cases: Sequence[Case], responses: tuple[results.FrequencyResponse, ...],
+    others: Sequence[fits.ExtendedFit], confidence: conf.Confidence,
+) -> results.Identification:  # fmt: skip
     """Gather the result. cases: with their noise, before any weight followed a misfit."""
     problem = solution.problem
-    errors = errors_by_channel(problem, outputs)
-    left = min([max(ratios_of(problem, cases, outputs).values()), *(other.times_noise for other in others)])
+    errors = conf.errors_by_channel(problem, outputs)
+    times_noise = max(fits.ratios_of(problem, cases, outputs).values())
+    left = min([times_noise, *(other.times_noise for other in others)])
     parameters = tuple(
-        replace(p, ci95=span_all(p.ci95, p.name, others), beside_misfit=left > FAR_FROM_NOISE)
-        for p in parameters_of(solution, confidence)
+        replace(p, ci95=fits.span_all(p.ci95, p.name, others), beside_misfit=left > results.FAR_FROM_NOISE)
+        for p in conf.parameters_of(solution, confidence)
     )
-    rig = identified_rig(solution, parameters)
+    rig = conf.identified_rig(solution, parameters)
     first = rig.under(records[0].source)
-    return Identification(
+    return results.Identification(
         rig=rig,
         sources=tuple(r.source for r in records),
         duration=sum(r.stop - r.start for r in records),
@@ -193,13 +166,13 @@ def _result(
         fit_percent={n: fit_percent(e, y) for n, (e, y) in errors.items()},
         responses=responses,
         models=tuple(model_response(first, r.output, r.frequency) for r in responses),
-        overlays=overlays_of(problem.cases[0], outputs[0]),
-        statics=statics_of(records[0], rig),
+        overlays=conf.overlays_of(problem.cases[0], outputs[0]),
+        statics=results.statics_of(records[0], rig),
         remarks=(
-            *off_rig(parameters),
-            *torque_scale(problem),
-            *stated_differences(problem),
-            *undetermined_remarks(problem.unknowns, confidence),
+            *conf.off_rig(parameters),
+            *conf.torque_scale(problem),
+            *conf.stated_differences(problem),
+            *conf.undetermined_remarks(problem.unknowns, confidence),
         ),
         notes=tuple(note for r in records for note in r.notes),
         faults=tuple(fault for r in records for fault in r.faults),

@@ -15,7 +15,7 @@ European Journal of Control 15, 2009.)
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.fft import rfft
@@ -113,8 +113,7 @@ def held_mean(command: Channel, edges: FloatArray) -> FloatArray:
     reach = np.interp(edges, command.t, area)
     reach += command.y[-1] * np.maximum(edges - command.t[-1], 0.0)
     reach += command.y[0] * np.minimum(edges - command.t[0], 0.0)
-    means: FloatArray = np.diff(reach) / np.diff(edges)
-    return means
+    return np.asarray(np.diff(reach) / np.diff(edges))
 
 
 def _at(place: FloatArray, y: FloatArray, wanted: FloatArray) -> FloatArray:
@@ -125,8 +124,7 @@ def _at(place: FloatArray, y: FloatArray, wanted: FloatArray) -> FloatArray:
         return y[near]
     from scipy.interpolate import make_interp_spline  # 0.1 s that even stamps need not wait for
 
-    spline: FloatArray = make_interp_spline(place, y, k=_DEGREE)(wanted)
-    return spline
+    return np.asarray(make_interp_spline(place, y, k=_DEGREE)(wanted))
 
 
 def _outside_gaps(place: FloatArray, index: FloatArray) -> BoolArray:
@@ -143,8 +141,7 @@ def _offsets(jitter: FloatArray) -> FloatArray:
     distance = jitter - np.rint(jitter)
     if np.max(np.abs(distance)) < _STEADY:
         return np.zeros(1)
-    quantiles: FloatArray = np.quantile(distance, (np.arange(_DRAWN) + 0.5) / _DRAWN)
-    return quantiles
+    return np.quantile(distance, (np.arange(_DRAWN) + 0.5) / _DRAWN)
 
 
 @dataclass(frozen=True)
@@ -166,11 +163,8 @@ class Lines:
     def up_to(self, highest: float) -> Lines:
         """Return the lines up to a frequency, Hz."""
         n = int(np.searchsorted(self.frequency, highest, side="right"))
-        return Lines(
-            method=self.method, frequency=self.frequency[:n], response=self.response[:n], sd=self.sd[:n],
-            coherence=self.coherence[:n], noise=None if self.noise is None else self.noise[:n],
-            distortion=None if self.distortion is None else self.distortion[:n],
-        )
+        cut = {k: v[:n] for k, v in vars(self).items() if k != "method" and v is not None}
+        return replace(self, **cut)
 
 
 def widen(sd: FloatArray, freedom: FloatArray | float) -> FloatArray:
@@ -182,16 +176,14 @@ def widen(sd: FloatArray, freedom: FloatArray | float) -> FloatArray:
     """
     m = np.maximum(freedom, 1.0)
     quantile = m * (0.05 ** (-1.0 / m) - 1.0)
-    result: FloatArray = sd * np.sqrt(quantile / -np.log(0.05))
-    return result
+    return np.asarray(sd * np.sqrt(quantile / -np.log(0.05)))
 
 
 def detrend(values: FloatArray) -> FloatArray:
     """Return values without their mean and slope."""
     place = np.linspace(-1.0, 1.0, len(values))
     slope = float(place @ values / (place @ place))
-    result: FloatArray = values - values.mean() - slope * place
-    return result
+    return np.asarray(values - values.mean() - slope * place)
 
 
 _UNKNOWNS = 6
@@ -256,12 +248,8 @@ def _estimates(
     residual = total - np.einsum("bi,bi->b", wanted.conj(), unknowns).real
     lines = np.array([2 * half + 1 for _, half in bands])
     noise = np.maximum(residual, _ROUNDING * total) / (lines - _UNKNOWNS)
-    return (
-        unknowns[:, 0] / scale[:, 0],
-        noise * inverse[:, 0, 0].real / scale[:, 0] ** 2,
-        noise,
-        scale[:, 0] ** 2 / lines,
-    )
+    size = scale[:, 0]
+    return unknowns[:, 0] / size, noise * inverse[:, 0, 0].real / size**2, noise, size**2 / lines
 
 
 def _products(u: ComplexArray, y: ComplexArray, centre: int, half: int) -> ComplexArray:
@@ -271,5 +259,4 @@ def _products(u: ComplexArray, y: ComplexArray, centre: int, half: int) -> Compl
     r = (np.arange(first, band.stop) - centre) / half
     powers = np.stack([np.ones(len(r)), r, r**2])
     rows = np.concatenate([powers * u[band], powers, y[band][None]])
-    products: ComplexArray = rows.conj() @ rows.T
-    return products
+    return np.asarray(rows.conj() @ rows.T)

@@ -113,9 +113,8 @@ class Injector:
 
     def _run(self, torque: FloatArray | None, place: Place) -> FloatArray:
         drive, rig = self.drive, self.rig
-        machine = build(
-            rig, drive.step, drive.drift_time, in_loop=len(drive.reference) > 0 or rig.loop is not None
-        )
+        in_loop = len(drive.reference) > 0 or rig.loop is not None
+        machine = build(rig, drive.step, drive.drift_time, in_loop=in_loop)
         if torque is not None:
             moves = {True: 5.0, False: 6.0}[rig.end_is_free("housing_end")]
             kind = moves if place == "load" else float(PORTS[place])

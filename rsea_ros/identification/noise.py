@@ -69,15 +69,13 @@ class SpectralShape:
     def at(self, share: FloatArray) -> FloatArray:
         """Return the level at shares of the Nyquist frequency."""
         least = np.maximum(share, self.share[0])
-        result: FloatArray = np.exp(np.interp(np.log(least), np.log(self.share), np.log(self.level)))
-        return result
+        return np.asarray(np.exp(np.interp(np.log(least), np.log(self.share), np.log(self.level))))
 
     def whiten(self, values: FloatArray) -> FloatArray:
         """Return values divided by the shape's amplitude at every frequency."""
         spectrum = rfft(values)
         gain = 1.0 / np.sqrt(self.at(np.linspace(0.0, 1.0, len(spectrum))))
-        white: FloatArray = irfft(spectrum * gain, len(values))
-        return white
+        return irfft(spectrum * gain, len(values))
 
 
 def shape_of(spectra: ComplexArray) -> SpectralShape:
@@ -180,8 +178,7 @@ def _seamless(spectra: ComplexArray, seams: Sequence[int] | IntArray) -> BoolArr
     """Return which of half-overlapping segments have no seam inside."""
     half = spectra.shape[1] - 1
     first = half * np.arange(len(spectra))
-    whole: BoolArray = np.searchsorted(seams, first, "right") == np.searchsorted(seams, first + 2 * half)
-    return whole
+    return np.asarray(np.searchsorted(seams, first, "right") == np.searchsorted(seams, first + 2 * half))
 
 
 def _powers(command: Channel, t: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -20,16 +20,8 @@ from dataclasses import replace
 import numpy as np
 
 from rsea_ros.effects.signal_table import sensor_of
-from rsea_ros.identification.noise import (
-    HANN,
-    OVERLAP,
-    TOP,
-    SpectralShape,
-    shape_of,
-    top_of_band,
-    unit_spectra,
-)
-from rsea_ros.identification.problem import Case
+from rsea_ros.identification import noise as noises
+from rsea_ros.identification.problem import Case, counted_span, residual_of
 from rsea_ros.model.drive import Drive
 from rsea_ros.records.record import ComplexArray, FloatArray, IntArray
 
@@ -44,8 +36,7 @@ def witnesses(
     t = case.t[channel]
     for n in case.measured.keys() & outputs.keys():
         if sensor_of(n) != sensor_of(channel):  # the noise of one encoder's channels agrees
-            residual = np.where(case.mask[n], case.measured[n] - outputs[n], 0.0)
-            yield np.interp(t, case.t[n], residual)
+            yield np.interp(t, case.t[n], residual_of(case, outputs, n))
     command, q, v, load = _motion(case, outputs, t)
     late = (t - t.mean()) / max(float(np.ptp(t)), 1e-9)
     yield command
@@ -98,27 +89,22 @@ def is_noise(
     outputs: of the fitted model, by channel. ratio: of the gear, rotor over output.
     False where the record is too short to decide.
     """
-    span = _span(case, channel)
+    span = counted_span(case.mask[channel])
     residual = residual_of(case, outputs, channel)[span]
     if len(residual) < _FEWEST or not np.any(residual):
         return False
     rate = 1.0 / float(np.median(np.diff(case.t[channel])))
     if _lasting_share(residual) > _LASTING or _slow(residual, rate) > _SLOW:
         return False
-    spectra = _as_made(case, channel, unit_spectra(residual, _LONG, 8))
-    shape = shape_of(spectra)
+    spectra = _as_made(case, channel, noises.unit_spectra(residual, _LONG, 8))
+    shape = noises.shape_of(spectra)
     if shape.off > _OFF or _unsteady(spectra, shape, rate) > _UNSTEADY:
         return False
     if _kurtosis(shape, residual) > _SPIKY:
         return False
-    short_spectra = unit_spectra(residual, _SHORT, 16)
-    others = (unit_spectra(w[span], _SHORT, 16) for w in witnesses(case, outputs, channel, ratio))
+    short_spectra = noises.unit_spectra(residual, _SHORT, 16)
+    others = (noises.unit_spectra(w[span], _SHORT, 16) for w in witnesses(case, outputs, channel, ratio))
     return all(_coherent_share(short_spectra, other, rate) < _SHARED for other in others)
-
-
-def residual_of(case: Case, outputs: Mapping[str, FloatArray], channel: str) -> FloatArray:
-    """Return measured - simulated, 0 where a sample does not count, shape of the channel."""
-    return np.where(case.mask[channel], case.measured[channel] - outputs[channel], 0.0)
 
 
 def _as_made(case: Case, channel: str, spectra: ComplexArray) -> ComplexArray:
@@ -144,7 +130,7 @@ def _lasting_share(values: FloatArray) -> float:
 
 def _slow(values: FloatArray, rate: float) -> float:
     """Return the power density below 0.25 Hz over that from 0.3 to 1 Hz; 0 where the record is too short."""
-    spectra = unit_spectra(values, 2**30, 2)
+    spectra = noises.unit_spectra(values, 2**30, 2)
     frequency, power = _lines(spectra, rate), np.mean(np.abs(spectra) ** 2, axis=0)
     low = (frequency > 0.0) & (frequency < 0.25)
     above = (frequency >= 0.3) & (frequency < 1.0)
@@ -153,18 +139,18 @@ def _slow(values: FloatArray, rate: float) -> float:
     return float(power[low].mean() / max(power[above].mean(), 1e-300))
 
 
-def _unsteady(spectra: ComplexArray, shape: SpectralShape, rate: float) -> float:
+def _unsteady(spectra: ComplexArray, shape: noises.SpectralShape, rate: float) -> float:
     """Return the variance of the whitened power over time, over stationary noise's, in the worst band."""
     power = np.abs(spectra) ** 2 / shape.at(np.linspace(0.0, 1.0, spectra.shape[1]))
     ratios = [0.0]
     for inside in _bands(_lines(spectra, rate), _STEADY_BANDS):
         level = power[:, inside].mean(axis=1)
-        expected = HANN / np.count_nonzero(inside)
+        expected = noises.HANN / np.count_nonzero(inside)
         ratios.append(float(np.var(level / level.mean())) / expected)
     return max(ratios)
 
 
-def _kurtosis(shape: SpectralShape, values: FloatArray) -> float:
+def _kurtosis(shape: noises.SpectralShape, values: FloatArray) -> float:
     """Return the excess kurtosis of whitened values."""
     white = shape.whiten(values)
     white = white - white.mean()
@@ -173,7 +159,7 @@ def _kurtosis(shape: SpectralShape, values: FloatArray) -> float:
 
 def _coherent_share(a: ComplexArray, b: ComplexArray, rate: float) -> float:
     """Return the share of the power of a that is coherent with b, without its bias, in the worst band."""
-    chance = OVERLAP / len(a)
+    chance = noises.OVERLAP / len(a)
     powers = np.sum(np.abs(a) ** 2, axis=0) * np.sum(np.abs(b) ** 2, axis=0)
     coherence = np.abs(np.sum(a * b.conj(), axis=0)) ** 2 / np.maximum(powers, 1e-300)
     share = (coherence - chance) / (1.0 - chance)
@@ -186,7 +172,7 @@ def _lines(spectra: ComplexArray, rate: float) -> FloatArray:
 
 def _bands(frequency: FloatArray, lows: tuple[float, ...]) -> list[FloatArray]:
     """Return which lines lie in each band that has some."""
-    top = TOP * frequency[-1]
+    top = noises.TOP * frequency[-1]
     ends = zip(lows, (*lows[1:], np.inf), strict=True)
     inside = [(frequency >= low) & (frequency < min(high, top)) for low, high in ends]
     return [which for which in inside if np.count_nonzero(which) > 1]
@@ -212,8 +198,8 @@ def reestimate_noise(case: Case, outputs: Mapping[str, FloatArray], ratio: float
     rms = {n: float(np.sqrt(np.mean(residuals[n][case.mask[n]] ** 2))) for n in channels}
     noise = dict(case.noise)
     for n in channels:
-        span = _span(case, n)
-        white, is_white = top_of_band(residuals[n][span], _seams(case, n) - span.start)
+        span = counted_span(case.mask[n])
+        white, is_white = noises.top_of_band(residuals[n][span], _seams(case, n) - span.start)
         white /= float(np.sqrt(np.mean(case.mask[n][span])))  # what does not count in between is zero
         level = white if is_white and isinstance(case.drive, Drive) else rms[n]  # a Motion is filtered
         noise[n] = max(min(noise[n], level), case.least.get(n, 0.0))
@@ -227,19 +213,12 @@ def reestimate_noise(case: Case, outputs: Mapping[str, FloatArray], ratio: float
     return replace(case, noise=noise, coloured=coloured)
 
 
-def _span(case: Case, channel: str) -> slice:
-    """Return the part of a channel from its first sample that counts to its last."""
-    at = np.flatnonzero(case.mask[channel])
-    return slice(int(at[0]), int(at[-1]) + 1) if len(at) else slice(0, len(case.mask[channel]))
-
-
 def _seams(case: Case, channel: str) -> IntArray:
     """Return the samples of a channel with which a span of a record begins, but for the first."""
     drive = case.drive
     if not isinstance(drive, Drive):
         return np.empty(0, np.int64)
-    ends = [drive.start + drive.step * end for _, end in drive.spans[:-1]]
-    return np.searchsorted(case.t[channel], ends)
+    return np.searchsorted(case.t[channel], [drive.start + drive.step * end for _, end in drive.spans[:-1]])
 
 
 def _doubt(case: Case, residual: FloatArray, channel: str) -> float:

@@ -112,7 +112,8 @@ def case_from(
     start = float(record["command"].t[0]) + SKIPPED_START
     known = {n: outside_gaps(record, record[n].t, SKIPPED_START) for n in channels}
     counts = {n: good[n] & known[n] & np.isfinite(record[n].y) & (record[n].t >= start) for n in channels}
-    heard = record.with_channels(**{n: _counted_span(record[n], counts[n]) for n in channels})
+    spans = {n: counted_span(counts[n]) for n in channels}  # noise elsewhere is not the fit's
+    heard = record.with_channels(**{n: Channel(record[n].t[s], record[n].y[s]) for n, s in spans.items()})
     return Case(
         drive=drive_of(record, rig),
         t=MappingProxyType({n: record[n].t for n in channels}),
@@ -126,11 +127,10 @@ def case_from(
     )
 
 
-def _counted_span(channel: Channel, counts: BoolArray) -> Channel:
-    """Return a channel from its first sample that counts to its last: noise elsewhere is not the fit's."""
+def counted_span(counts: BoolArray) -> slice:
+    """Return the part of a channel from its first sample that counts to its last; all where none does."""
     at = np.flatnonzero(counts)
-    span = slice(int(at[0]), int(at[-1]) + 1) if len(at) else slice(None)
-    return Channel(channel.t[span], channel.y[span])
+    return slice(int(at[0]), int(at[-1]) + 1) if len(at) else slice(0, len(counts))
 
 
 def channels_that_tell(record: Record, rig: Rig) -> list[str]:
@@ -275,6 +275,11 @@ def _instants(drive: Drive, clocks: Clocks) -> Mapping[str, FloatArray]:
     }
 
 
+def residual_of(case: Case, outputs: Mapping[str, FloatArray], channel: str) -> FloatArray:
+    """Return measured - simulated, 0 where a sample does not count, shape of the channel."""
+    return np.where(case.mask[channel], case.measured[channel] - outputs[channel], 0.0)
+
+
 def weighted_residual(case: Case, outputs: Mapping[str, FloatArray], channels: Sequence[str]) -> FloatArray:
     """Return (simulated - measured) / noise of the samples that count, channel after channel.
 
@@ -394,24 +399,14 @@ class Problem:
 
     def by_row(self, number: Callable[[Case, str], float]) -> FloatArray:
         """Return a number that belongs to each case and channel for every residual, shape (m,)."""
-        parts = [
-            np.full(np.count_nonzero(case.mask[n]), number(case, n))
-            for case in self.cases
-            for n in self.present(case)
-        ]
-        return np.concatenate(parts)
+        rows = ((case, n) for case in self.cases for n in self.present(case))
+        return np.concatenate([np.full(np.count_nonzero(case.mask[n]), number(case, n)) for case, n in rows])
 
     def since_start(self) -> FloatArray:
         """Return for every residual the time since the start of its record, s, shape (m,)."""
-        return np.concatenate(
-            [
-                case.t[n][case.mask[n]]
-                - case.start
-                + (case.drive.origin if isinstance(case.drive, Drive) else 0.0)
-                for case in self.cases
-                for n in self.present(case)
-            ]
-        )
+        begins = [case.drive.origin if isinstance(case.drive, Drive) else 0.0 for case in self.cases]
+        cases = zip(self.cases, begins, strict=True)
+        return np.concatenate([c.t[n][c.mask[n]] - c.start + at for c, at in cases for n in self.present(c)])
 
     def present(self, case: Case) -> list[str]:
         """Return the channels of a case that count, in a fixed order."""

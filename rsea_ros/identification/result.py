@@ -333,5 +333,4 @@ class Identification:
         if not self.at_noise or self.silent:
             return "misfit"
         physical = [p for p in self.parameters if not p.name.startswith(CLOCKS)]
-        is_any_determined = any(p.is_identifiable for p in physical)
-        return "adequate" if is_any_determined or not physical else "not_identifiable"
+        return "adequate" if any(p.is_identifiable for p in physical) or not physical else "not_identifiable"

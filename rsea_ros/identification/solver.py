@@ -115,13 +115,8 @@ def clock_columns(problem: Problem, theta: FloatArray, clocks: Sequence[Unknown]
     slope = (later - earlier) / (2.0 * _CLOCK_DIFFERENCE)
     channel = problem.by_row(lambda case, n: problem.channels.index(n))
     since = 1e-6 * problem.since_start()
-    return np.column_stack(
-        [
-            np.where(channel == problem.channels.index(c.name.split(".")[1]), slope, 0.0)
-            * (since if c.is_rate else 1.0)
-            for c in clocks
-        ]
-    )
+    own = [(channel == problem.channels.index(c.name.split(".")[1]), c.is_rate) for c in clocks]
+    return np.column_stack([np.where(at, slope, 0.0) * (since if is_rate else 1.0) for at, is_rate in own])
 
 
 def power(residual: FloatArray) -> float:
@@ -273,8 +268,7 @@ def broyden_update(matrix: FloatArray, step: FloatArray, change: FloatArray) -> 
     """
     size = np.einsum("ij,ij->j", matrix, matrix)
     along = size * step / max(float(size @ step**2), 1e-300)
-    updated: FloatArray = dger(1.0, along, change - matrix @ step, a=matrix.T).T
-    return updated
+    return np.asarray(dger(1.0, along, change - matrix @ step, a=matrix.T).T)
 
 
 def bounded_step(problem: Problem, theta: FloatArray, normal: FloatArray, slope: FloatArray) -> FloatArray:

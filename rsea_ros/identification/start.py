@@ -69,11 +69,8 @@ def _choose_lines(response: FrequencyResponse) -> FrequencyResponse:
     if len(good) > _LINES:
         wanted = np.geomspace(response.frequency[good[0]], response.frequency[good[-1]], _LINES)
         good = good[np.unique(np.searchsorted(response.frequency[good], wanted).clip(0, len(good) - 1))]
-    return FrequencyResponse(
-        input=response.input, output=response.output, frequency=response.frequency[good],
-        response=response.response[good], coherence=response.coherence[good], sd=response.sd[good],
-        method=response.method,
-    )
+    chosen = {n: getattr(response, n)[good] for n in ("frequency", "response", "coherence", "sd")}
+    return replace(response, **chosen, noise=None, distortion=None)
 
 
 def _misfit(measured: FrequencyResponse, rig: Rig) -> FloatArray:
@@ -195,8 +192,7 @@ def _speed(case: Case) -> float:
 
 def _period(case: Case) -> float:
     """Return the time between samples of the channel that has most of them, s."""
-    periods = [float(np.median(np.diff(t))) for t in case.t.values() if len(t) > 1]
-    return min(periods, default=math.nan)
+    return min([float(np.median(np.diff(t))) for t in case.t.values() if len(t) > 1], default=math.nan)
 
 
 def _largest(case: Case, channel: str) -> float:

@@ -120,11 +120,8 @@ class Unknown:
 
     def at_bound(self, coordinate: float) -> bool:
         """Return whether the fit ended at a bound that is not where it vanishes."""
-        ends = [
-            self.inner(b)
-            for b in (self.low, self.high)
-            if math.isfinite(b) and (b > 0.0 or not self.logarithmic)
-        ]
+        bounds = (b for b in (self.low, self.high) if b > 0.0 or not self.logarithmic)
+        ends = [self.inner(b) for b in bounds if math.isfinite(b)]
         return any(abs(coordinate - end) < 1e-6 * self.scale for end in ends if end != self.inner(self.start))
 
     def is_near_bound(self, coordinate: float, near: float) -> bool:
@@ -231,8 +228,7 @@ def apply(rig: Rig, unknowns: Sequence[Unknown], theta: FloatArray) -> tuple[Rig
 
 def _move(setting: EffectSetting, values: Mapping[str, float]) -> EffectSetting:
     names = (u for u in values if u.startswith(f"{setting.name}."))
-    moved = {**setting.parameters, **{n.split(".")[1]: values[n] for n in names}}
-    return replace(setting, parameters=moved)
+    return replace(setting, parameters={**setting.parameters, **{n.split(".")[1]: values[n] for n in names}})
 
 
 def bounds_of(unknowns: Sequence[Unknown]) -> tuple[FloatArray, FloatArray]:

@@ -8,10 +8,10 @@ import numpy as np
 
 from rsea_ros.checks.faults import check
 from rsea_ros.diagnosis.data_split import TEST, TRAIN, VALIDATION, part
-from rsea_ros.diagnosis.diagnose import nominal_problem
+from rsea_ros.diagnosis.diagnose import nominal_problem, on_steady_clocks
 from rsea_ros.diagnosis.score import Score, score_on
 from rsea_ros.diagnosis.settings import DEFAULT
-from rsea_ros.identification.fit import fit, with_even_clocks, with_noise_of
+from rsea_ros.identification.fit import fit, with_noise_of
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Solution
 from rsea_ros.identification.start import joint_start
@@ -65,9 +65,7 @@ def fitted_base(records: Sequence[Record], rig: Rig) -> Base:
     """Fit a rig to all blocks of records but the test blocks."""
     rig = rig.with_effects(*(e for e in rig.effects if not e.guess))
     records = [bound_values(with_command(r, rig)) for r in records]
-    checked = [check(r, rig) for r in records]
-    steady = with_even_clocks([c.record for c in checked], [c.masked for c in checked], rig)
-    checked = [replace(c, record=r) for c, r in zip(checked, steady.records, strict=True)]
+    checked, _ = on_steady_clocks([check(r, rig) for r in records], rig)
     problem = nominal_problem(checked, rig)
     parts = [part(c, FITTED, DEFAULT.blocks) for c in problem.cases]
     start = joint_start(checked[0].record, rig) if rig.loop is not None else None

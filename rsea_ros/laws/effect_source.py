@@ -86,7 +86,7 @@ def _variables(law: laws.Law) -> list[str]:
         value = _read(law, letter)
         within = f"min(max({value}, -{limit:.6g}), {limit:.6g})"
         lines.append(f"{letter} = {within if is_limited(law, letter) else value}")
-    time = laws.time_letters(law)
+    time = laws.names_in(law)
     if "t" in time:
         lines.append("t = s[TIME]")
     if "share" in time:

@@ -160,24 +160,15 @@ def words_of(expression: str) -> set[str]:
     return set(re.findall(r"[a-z_A-Z]+", expression))
 
 
-def time_letters(law: Law) -> set[str]:
-    return _names_in(law) & {"t", "share"}
-
-
 def letters_of(law: Law) -> set[str]:
     """Return the letters of the variables that a law reads."""
     remembered = {part.term.remembers for part in law.parts if part.term.memory}
-    return (_names_in(law) | remembered | ({"w"} if law.is_friction else set())) & set(READS)
+    return (names_in(law) | remembered | ({"w"} if law.is_friction else set())) & set(READS)
 
 
-def _names_in(law: Law) -> set[str]:
+def names_in(law: Law) -> set[str]:
     names = {law.curve.over, law.curve.factor} if law.curve is not None else set()
     return names.union(*(words_of(part.term.expression) for part in law.parts))
-
-
-def ranges_of(law: Law, letters: Mapping[str, np.ndarray]) -> dict[str, float]:
-    """Return the largest size of each variable that a law reads."""
-    return {n: float(np.max(np.abs(letters[n]))) for n in READS if n in letters_of(law)}
 
 
 @dataclass(frozen=True)

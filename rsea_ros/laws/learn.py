@@ -319,8 +319,9 @@ def curve_of(search: choices.Search, dependence: Dependence) -> forms.Law:
 
 def _with_ranges(law: forms.Law, cases: Sequence[CaseModel]) -> forms.Law:
     by_case = [c.variables.letters for c in cases]
-    letters = {n: np.concatenate([each[n] for each in by_case]) for n in by_case[0]}
-    return replace(law, ranges=forms.ranges_of(law, letters))
+    read = [n for n in forms.READS if n in forms.letters_of(law)]
+    largest = {n: float(np.max(np.abs(np.concatenate([each[n] for each in by_case])))) for n in read}
+    return replace(law, ranges=largest)
 
 
 def _slug(text: str) -> str:

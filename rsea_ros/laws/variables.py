@@ -17,7 +17,7 @@ from rsea_ros.compiler import njit
 from rsea_ros.diagnosis.data_split import blocks_of, set_of
 from rsea_ros.diagnosis.settings import DEFAULT
 from rsea_ros.identification.missing_torque import PORTS, Injector, MissingTorque, Place, missing_torque
-from rsea_ros.identification.problem import Case, Problem
+from rsea_ros.identification.problem import Case, Problem, residual_of
 from rsea_ros.identification.solver import jacobian
 from rsea_ros.identification.unknowns import apply
 from rsea_ros.laws.terms import Term
@@ -251,7 +251,7 @@ def case_model(
     """
     rig, clocks = apply(problem.rig, problem.unknowns, theta)
     rig = rig.under(case.source)
-    residual = {n: np.where(case.mask[n], case.measured[n] - outputs[n], 0.0) for n in case.measured}
+    residual = {n: residual_of(case, outputs, n) for n in case.measured}
     if isinstance(case.drive, Motion):
         t = case.drive.t - case.drive.t[0]
         torque = -residual["motor_torque"]

@@ -24,8 +24,6 @@ from rsea_ros.report.figures import figure as fig
 from rsea_ros.report.figures.response import bode_figure
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from plotly.graph_objects import Figure
 
 

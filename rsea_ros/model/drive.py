@@ -20,7 +20,7 @@ from rsea_ros.model.extent import AS_SECONDS, check_extent, check_slow
 from rsea_ros.model.rig import Hold, Rig
 from rsea_ros.model.step import OUTPUTS
 from rsea_ros.records.holds import lost_commands
-from rsea_ros.records.record import BoolArray, Channel, FloatArray, Record
+from rsea_ros.records.record import BoolArray, FloatArray, Record
 from rsea_ros.records.statistics import running_integral
 
 AT_REST = 0.5
@@ -208,8 +208,7 @@ def mean_of_line(knots: FloatArray, y: FloatArray, count: int) -> FloatArray:
     """Return the mean over each step of the lines between the stamps (in steps), held beyond the last."""
     at = np.union1d(knots, np.arange(count + 1.0))
     line = np.interp(at, knots, y)
-    area = running_integral(line, at)
-    return np.diff(np.interp(np.arange(count + 1.0), at, area))
+    return np.diff(np.interp(np.arange(count + 1.0), at, running_integral(line, at)))
 
 
 def mean_of_curve(finer: int, knots: FloatArray, y: FloatArray, count: int) -> FloatArray:
@@ -331,8 +330,8 @@ def drive_from(
         )
     knots, torque = in_steps(command.t, start, step), command.y
     if closed_loop:
-        shown = "motor_torque" if "motor_torque" in record else "command"
-        torque = torque - np.interp(command.t, *_ty(record[shown]))
+        shown, asked = record["motor_torque" if "motor_torque" in record else "command"], record["reference"]
+        torque = torque - np.interp(command.t, shown.t, shown.y)
     jumps = hold == "zero"
     means = {"zero": mean_of_held, "first": mean_of_line, "band": partial(mean_of_curve, steps)}
     held = means[hold](knots, torque, count)
@@ -340,7 +339,7 @@ def drive_from(
     ends = np.asarray(start + step * np.arange(1, count + 1), np.float64)
     return Drive(
         step=step, start=start, command=held, at=MappingProxyType(at),
-        reference=np.interp(ends - step, *_ty(record["reference"])) if closed_loop else np.empty(0),
+        reference=np.interp(ends - step, asked.t, asked.y) if closed_loop else np.empty(0),
         angle=angle_at(record, ends),
         initial=(0.0, 0.0) if from_rest else first_state(record) if targeted else initial_state(record),
         hold=steps, jumps=jumps, restarts=restarts(record, start, step, from_rest=from_rest),
@@ -397,7 +396,3 @@ def _period(t: FloatArray) -> float:
     if not median > 0.0:
         raise IdentificationError(f"command: median stamp interval {median:g} s, expected > 0 s")
     return float(t[-1] - t[0]) / max(1.0, float(np.sum(np.round(intervals / median))))
-
-
-def _ty(channel: Channel) -> tuple[FloatArray, FloatArray]:
-    return channel.t, channel.y

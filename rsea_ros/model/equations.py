@@ -109,10 +109,7 @@ def mechanics(rig: Rig, *, linear_gravity: bool = True) -> Mechanics:
         raise RigError(
             f"rig {rig.name}: the mass matrix is singular, expected an inertia on every part that can move"
         )
-    return Mechanics(
-        mass=mass, damping=damping, stiffness=stiffness, ports=PORT_DIRECTIONS @ placement,
-        placement=placement,
-    )
+    return Mechanics(mass, damping, stiffness, PORT_DIRECTIONS @ placement, placement)
 
 
 def owners(rig: Rig) -> dict[int, int]:

@@ -274,8 +274,7 @@ def _sampled_spans(record: Record, start: float, stop: float) -> list[tuple[floa
     lost.sort()
     ends, begins = [*(a for a, _ in lost), stop], [start, *(b for _, b in lost)]
     parts = [(max(begins[: k + 1]), min(ends[k:])) for k in range(len(ends))]
-    long = [(begin, end) for begin, end in parts if end - begin > 2.0 * SKIPPED_START]
-    return long or [(start, stop)]
+    return [(begin, end) for begin, end in parts if end - begin > 2.0 * SKIPPED_START] or [(start, stop)]
 
 
 def _finite(record: Record) -> Record:
@@ -283,8 +282,7 @@ def _finite(record: Record) -> Record:
     kept = {n: (c, np.isfinite(c.y)) for n, c in record.channels.items() if n in _FILTERED}
     held = {n: Channel(c.t[good], c.y[good]) for n, (c, good) in kept.items() if not good.all()}
     empty = {n for n, c in held.items() if not len(c)} - {"position"}
-    channels = {n: c for n, c in {**record.channels, **held}.items() if n not in empty}
-    return replace(record, channels=channels)
+    return replace(record, channels={n: c for n, c in {**record.channels, **held}.items() if n not in empty})
 
 
 def acting_torque(record: Record) -> Channel:

@@ -87,8 +87,7 @@ def close_loop(rig: Rig, plant: ComplexArray, output: ComplexArray, s: ComplexAr
     else:
         inner = velocity + integral / s
         ahead, back = inner * position, inner * (position + s)
-    result: ComplexArray = output * ahead / (1.0 + plant * back)
-    return result
+    return output * ahead / (1.0 + plant * back)
 
 
 PD, CASCADE = 0.0, 1.0

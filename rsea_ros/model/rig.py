@@ -7,7 +7,7 @@ FIELDS is the only list of the values that a rig may have, by the dotted names o
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import PurePath
 from types import MappingProxyType
@@ -407,8 +407,14 @@ def motor_torque(rig: Rig) -> tuple[float, str]:
 
 def check_structure(rig: Rig) -> None:
     """Raise RigError where parts of a rig contradict each other, or one is missing."""
+    for told, field_name in _contradictions(rig):
+        raise RigError(f"rig {rig.name}: {told}", field_name)
+
+
+def _contradictions(rig: Rig) -> Iterator[tuple[str, str]]:
+    """Yield what is wrong with expected, and the field. Raises RigError for a value that is missing."""
     for end in set(rig.clamped) - set(END_NAMES):
-        raise RigError(f"rig {rig.name}: clamped end {end!r}, expected one of {', '.join(END_NAMES)}")
+        yield f"clamped end {end!r}, expected one of {', '.join(END_NAMES)}", ""
     for key, value, allowed in (
         ("gear.train", rig.train, TRAINS), *(("gear.or", train, TRAINS) for train in rig.other_trains),
         ("proximal", rig.proximal, END_NAMES), ("ft_end", rig.ft_end, END_NAMES),
@@ -417,26 +423,59 @@ def check_structure(rig: Rig) -> None:
         ("beside_spring", rig.beside_spring, PARTS),
     ):  # fmt: skip
         if value not in allowed:
-            raise RigError(f"rig {rig.name}: {key} = {value!r}, expected one of {', '.join(allowed)}", key)
+            yield f"{key} = {value!r}, expected one of {', '.join(allowed)}", key
     if rig.beside_spring == "housing" and rig["housing.inertia"]:
-        raise RigError(
-            f"rig {rig.name}: housing.inertia with beside_spring: housing, expected it as chassis.inertia: "
-            "that of the part beside the spring",
-            "housing.inertia",
-        )
+        expected = "expected it as chassis.inertia: that of the part beside the spring"
+        yield f"housing.inertia with beside_spring: housing, {expected}", "housing.inertia"
     if rig.ft_end == "housing_end" and math.isinf(rig["proximal_spring.stiffness"]):
-        raise RigError(
-            f"rig {rig.name}: ft_end = housing_end without proximal_spring.stiffness, expected that of the "
-            "sensor, N·m/rad"
-        )
-    _check_spring(rig)
+        expected = "expected that of the sensor, N·m/rad"
+        yield f"ft_end = housing_end without proximal_spring.stiffness, {expected}", ""
+    if rig.rigid_spring and "spring_end" in rig.clamped and math.isinf(rig["gear.stiffness"]):
+        yield "spring rigid and spring_end clamped, expected one of them: nothing could move", ""
+    if not rig.rigid_spring and math.isinf(rig["spring.stiffness"]):
+        value = "= inf" if "spring.stiffness" in rig.quantities else "is missing"
+        yield f"spring.stiffness {value}, expected a value in N·m/rad or `rigid: true`", "spring.stiffness"
     for name in ("rotor.reflected_inertia", "rotor.reflected_damping"):
         rig[name]
-    _check_loop(rig)
-    _check_motion(rig)
+    yield from _of_loop(rig)
+    for what, is_so in {
+        "a rigid spring, which is judged so by itself": rig.rigid_spring,
+        "a position loop": rig.loop is not None,
+        "a housing that moves": rig.end_is_free("housing_end"),
+        "a gear that gives": not math.isinf(rig["gear.stiffness"]),
+        "the F/T sensor at the housing": rig.ft_end != "spring_end",
+    }.items():  # what torques along a measured motion cannot be told of
+        if is_so and rig.motion == "measured":
+            yield f"motion = measured with {what}, expected simulated", "motion"
     for end in END_NAMES:
         if rig.end_is_free(end):
             rig[f"{end}.inertia"]
+
+
+def _of_loop(rig: Rig) -> Iterator[tuple[str, str]]:
+    """Yield what is wrong with a position loop: kind, gains and limits; a MIT frame has gains of its own."""
+    stated = [n.split(".")[1] for n in rig.quantities if n.startswith("controller.")]
+    kinds = f"expected one of {', '.join(LOOP_FIELDS)}"
+    if rig.loop is None:
+        if stated:
+            yield f"controller.{stated[0]} without controller.kind, {kinds}", "controller"
+        return
+    if rig.loop not in LOOP_FIELDS:
+        yield f"controller.kind = {rig.loop!r}, {kinds}", "controller.kind"
+    allowed = loop_names(rig.loop)
+    for name in (name for name in stated if name not in allowed):
+        expected = f"expected {', '.join(allowed)}"
+        yield f"controller.{name} in a {rig.loop} loop, {expected}", f"controller.{name}"
+    for name in LOOP_FIELDS[rig.loop]:
+        rig[f"controller.{name}"]
+    if rig.loop == "mit" and rig["controller.k_p"] == 0.0:
+        yield (
+            "controller.k_p = 0 in a mit loop, expected > 0 N·m/rad; frames of torques alone have no "
+            "controller: map their torque as `command`, add k_d to rotor.reflected_damping"
+        ), "controller.k_p"
+    for name in LOOP_FIELDS["mit"] if rig.loop == "mit" else ():
+        if (where := f"controller.{name}") in rig.free():
+            yield f"{where} has a spread of {rig.spread(where):g}, expected none: frames say it", where
 
 
 def check_two_torques(rig: Rig) -> None:
@@ -449,73 +488,3 @@ def check_unfiltered(rig: Rig, channels: Collection[str], what: str) -> None:
     """Raise RigError where a channel has a known filter that something (what) cannot serve."""
     for at in (f"sensors.{n}.filter" for n in rig.filters() if n in channels):
         raise RigError(f"rig {rig.name}: {at}, expected none for {what}", at)
-
-
-def _check_spring(rig: Rig) -> None:
-    if rig.rigid_spring and "spring_end" in rig.clamped and math.isinf(rig["gear.stiffness"]):
-        raise RigError(
-            f"rig {rig.name}: spring rigid and spring_end clamped, expected one of them: nothing could move"
-        )
-    if not rig.rigid_spring and math.isinf(rig["spring.stiffness"]):
-        value = "= inf" if "spring.stiffness" in rig.quantities else "is missing"
-        raise RigError(
-            f"rig {rig.name}: spring.stiffness {value}, expected a value in N·m/rad or `rigid: true`",
-            "spring.stiffness",
-        )
-
-
-def _check_motion(rig: Rig) -> None:
-    """Raise RigError for a measured motion of what the torques along it cannot be told of."""
-    reasons = {
-        "a rigid spring, which is judged so by itself": rig.rigid_spring,
-        "a position loop": rig.loop is not None,
-        "a housing that moves": rig.end_is_free("housing_end"),
-        "a gear that gives": not math.isinf(rig["gear.stiffness"]),
-        "the F/T sensor at the housing": rig.ft_end != "spring_end",
-    }
-    for what in (what for what, is_so in reasons.items() if is_so and rig.motion == "measured"):
-        raise RigError(f"rig {rig.name}: motion = measured with {what}, expected simulated", "motion")
-
-
-def _check_loop(rig: Rig) -> None:
-    stated = [n.split(".")[1] for n in rig.quantities if n.startswith("controller.")]
-    if rig.loop is None:
-        if stated:
-            raise RigError(
-                f"rig {rig.name}: controller.{stated[0]} without controller.kind, expected one of "
-                f"{', '.join(LOOP_FIELDS)}",
-                "controller",
-            )
-        return
-    if rig.loop not in LOOP_FIELDS:
-        raise RigError(
-            f"rig {rig.name}: controller.kind = {rig.loop!r}, expected one of {', '.join(LOOP_FIELDS)}",
-            "controller.kind",
-        )
-    allowed = loop_names(rig.loop)
-    for name in stated:
-        if name not in allowed:
-            raise RigError(
-                f"rig {rig.name}: controller.{name} in a {rig.loop} loop, expected {', '.join(allowed)}",
-                f"controller.{name}",
-            )
-    for name in LOOP_FIELDS[rig.loop]:
-        rig[f"controller.{name}"]
-    if rig.loop == "mit":
-        _check_frame(rig)
-
-
-def _check_frame(rig: Rig) -> None:
-    """Raise RigError for a MIT frame without a position loop, and for gains that a fit may change."""
-    if rig["controller.k_p"] == 0.0:
-        raise RigError(
-            f"rig {rig.name}: controller.k_p = 0 in a mit loop, expected > 0 N·m/rad; frames of torques "
-            "alone have no controller: map their torque as `command`, add k_d to rotor.reflected_damping",
-            "controller.k_p",
-        )
-    for name in (n for n in LOOP_FIELDS["mit"] if f"controller.{n}" in rig.free()):
-        where = f"controller.{name}"
-        raise RigError(
-            f"rig {rig.name}: {where} has a spread of {rig.spread(where):g}, expected none: frames say it",
-            where,
-        )

@@ -28,36 +28,21 @@ from rsea_ros.documents.units import plain, with_unit
 from rsea_ros.documents.wording import did_you_mean, quote
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.errors import FieldError, RigError, RseaError
-from rsea_ros.model.rig import (
-    CLOCK_DOUBT,
-    END_NAMES,
-    FIELDS,
-    HOLDS,
-    LOOP_FIELDS,
-    Condition,
-    EffectSetting,
-    Field,
-    PositionLoop,
-    Quantity,
-    Rig,
-    Sensor,
-    check_value,
-    loop_names,
-)
+from rsea_ros.model import rig as rigs
 from rsea_ros.model.sensor_filter import KINDS, SensorFilter
 from rsea_ros.model.train import PARTS, TRAINS
 from rsea_ros.records.record import MEASURED, UNITS
 
 T = TypeVar("T")
 _TRAINS = ", ".join(f"`{train}`" for train in TRAINS)
-GROUPS = sorted({name.split(".")[0] for name in FIELDS} - {"controller"})
+GROUPS = sorted({name.split(".")[0] for name in rigs.FIELDS} - {"controller"})
 SWITCHES: Mapping[str, Sequence[Key]] = {
     "gear": (
         Key("train", _TRAINS, "planetary", "kind of gear train, and the part that is held"),
         Key("or", "list of trains", "none", "other possible kinds"),
     ),
     "spring": (Key("rigid", "true or false", "false", "there is no spring"),),
-    **{end: (Key("clamped", "true or false", "false", "this end cannot move"),) for end in END_NAMES},
+    **{end: (Key("clamped", "true or false", "false", "this end cannot move"),) for end in rigs.END_NAMES},
 }  # fmt: skip
 TOP = (
     Key("name", "text", "name of the file", "name of the rig"),
@@ -103,10 +88,10 @@ FILTER += [
 CLOCK = (
     Key("value", "number", NEEDED),
     Key("unit", "s", NEEDED),
-    Key("doubt", "s, > 0, below 0.01 s", f"{CLOCK_DOUBT:g} s", "one sigma of `value`"),
+    Key("doubt", "s, > 0, below 0.01 s", f"{rigs.CLOCK_DOUBT:g} s", "one sigma of `value`"),
 )
 CLOCK_RATE = (Key("value", "number", NEEDED), Key("unit", "ppm", NEEDED))
-LOOP_KIND = Key("kind", ", ".join(f"`{k}`" for k in LOOP_FIELDS), NEEDED, "kind of the position loop")
+LOOP_KIND = Key("kind", ", ".join(f"`{k}`" for k in rigs.LOOP_FIELDS), NEEDED, "kind of the position loop")
 CONTROLLER = (
     Key("k_p", "1/s, >= 0", NEEDED, "command = k_v (k_p (reference - q) - dq/dt)"),
     Key("k_v", "N·m·s/rad, >= 0", NEEDED),
@@ -137,7 +122,7 @@ _FASTEST = 1000.0
 """ppm. A clock that runs faster than this counts in other units."""
 
 
-def sensors_from(body: Mapping[str, Any]) -> dict[str, Sensor]:
+def sensors_from(body: Mapping[str, Any]) -> dict[str, rigs.Sensor]:
     """Return the sensors by channel, from the file's `sensors`."""
     only_keys(body, set(MEASURED), "sensors")
     sensors = {}
@@ -156,14 +141,15 @@ def sensors_from(body: Mapping[str, Any]) -> dict[str, Sensor]:
         if delay < 0.0:
             expected = "expected 0 or more: a reading is no younger"
             raise RigError(f"{at}.delay.value = {delay:g} s, {expected}", f"{at}.delay")
-        sensors[name] = Sensor(noise, quantum, floating, *clock, rate, delay, _filter(fields, f"{at}.filter"))
+        lowpass = _filter(fields, f"{at}.filter")
+        sensors[name] = rigs.Sensor(noise, quantum, floating, *clock, rate, delay, lowpass)
     return sensors
 
 
 def _clock(fields: Mapping[str, Any], field: str) -> tuple[float, float]:
     """Return value and doubt, s, from `clock: {value: …, unit: s, doubt: …}`; 0 where there is none."""
     value = _stated(fields, field, "s", _LATEST, CLOCK)
-    doubt = number(fields.get("clock", {}).get("doubt", CLOCK_DOUBT), f"{field}.doubt", "s")
+    doubt = number(fields.get("clock", {}).get("doubt", rigs.CLOCK_DOUBT), f"{field}.doubt", "s")
     if not 0.0 < doubt < _LATEST:
         raise RigError(f"{field}.doubt = {doubt:g} s, expected more than 0, less than {_LATEST:g} s", field)
     return value, doubt
@@ -204,7 +190,7 @@ def _filter(fields: Mapping[str, Any], field: str) -> SensorFilter | None:
     return SensorFilter(kind, tuple(numbers))
 
 
-def check_effects(settings: Sequence[EffectSetting]) -> None:
+def check_effects(settings: Sequence[rigs.EffectSetting]) -> None:
     """Raise FieldError for an effect that is unknown or listed twice, and for a value out of bounds."""
     for i, setting in enumerate(settings):
         if setting.name in (earlier.name for earlier in settings[:i]):
@@ -215,7 +201,7 @@ def check_effects(settings: Sequence[EffectSetting]) -> None:
             raise FieldError(str(error), f"effects[{i}].parameters") from None
 
 
-def rig_from_document(document: Mapping[str, Any], default_name: str = "rig") -> Rig:
+def rig_from_document(document: Mapping[str, Any], default_name: str = "rig") -> rigs.Rig:
     """Build a rig from the parsed YAML. Raises RigError naming the field."""
     try:
         return _rig(document, default_name)
@@ -223,15 +209,15 @@ def rig_from_document(document: Mapping[str, Any], default_name: str = "rig") ->
         raise RigError(str(error), error.field) from None
 
 
-def _rig(document: Mapping[str, Any], default_name: str) -> Rig:
+def _rig(document: Mapping[str, Any], default_name: str) -> rigs.Rig:
     only_keys(document, names(TOP), "rig")
     groups = {g: mapping(document.get(g, {}), g) for g in GROUPS}
     quantities = {name: q for g, body in groups.items() for name, q in _quantities(g, body)}
     loop, gains = _loop(document.get("controller"))
     quantities |= gains
-    clamped = frozenset(end for end in END_NAMES if switch(groups[end], f"{end}.clamped"))
+    clamped = frozenset(end for end in rigs.END_NAMES if switch(groups[end], f"{end}.clamped"))
     effects = _effects(document.get("effects", []))
-    rig = Rig(
+    rig = rigs.Rig(
         name=text(document.get("name", default_name), "name"),
         about=text(document.get("about", ""), "about"),
         source=text(document.get("source", ""), "source"),
@@ -253,18 +239,18 @@ def _rig(document: Mapping[str, Any], default_name: str) -> Rig:
         motion=text(document.get("motion", ""), "motion"),
         loop=loop,
         controller=None if loop else _controller(document.get("controller")),
-        hold=_one_of(HOLDS, document, "hold"),
+        hold=_one_of(rigs.HOLDS, document, "hold"),
         effects=effects,
     )
     return with_conditions(rig, document["conditions"]) if "conditions" in document else rig
 
 
-def with_conditions(rig: Rig, items: Any, records: Collection[str] = ()) -> Rig:
+def with_conditions(rig: rigs.Rig, items: Any, records: Collection[str] = ()) -> rigs.Rig:
     """Return the rig with what a document says of single records. records: that there are; none: any.
 
     Raises RigError naming the field.
     """
-    conditions: list[Condition] = []
+    conditions: list[rigs.Condition] = []
     for i, item in enumerate(sequence(items, "conditions", "{record: …, …}") or [None]):
         try:
             conditions.append(_condition(item, rig, records))
@@ -276,7 +262,7 @@ def with_conditions(rig: Rig, items: Any, records: Collection[str] = ()) -> Rig:
     return replace(rig, conditions=tuple(conditions))
 
 
-def _condition(item: Any, rig: Rig, records: Collection[str]) -> Condition:
+def _condition(item: Any, rig: rigs.Rig, records: Collection[str]) -> rigs.Condition:
     body = mapping(item, "condition", "a mapping with the key record")
     only_keys(body, names(CONDITION), "condition")
     record = text(body.get("record"), "record")
@@ -297,20 +283,20 @@ def _condition(item: Any, rig: Rig, records: Collection[str]) -> Condition:
     of_rig = {name: rig.quantities[name] for name in separate}
     more = {name: quantity.value for name, quantity in added.items()}
     effects = frozenset(effect_named(text(name, "without")).name for name in without)
-    return Condition(record, {**values, **of_rig}, more, effects)
+    return rigs.Condition(record, {**values, **of_rig}, more, effects)
 
 
-def _differences(item: Any, key: str) -> dict[str, Quantity]:
+def _differences(item: Any, key: str) -> dict[str, rigs.Quantity]:
     body = mapping(item, key, "a mapping of GROUP.FIELD to {value: …, unit: …}")
-    for name in (name for name in body if name not in FIELDS):
-        near = did_you_mean(str(name), FIELDS)
+    for name in (name for name in body if name not in rigs.FIELDS):
+        near = did_you_mean(str(name), rigs.FIELDS)
         raise RigError(f"{key}: {quote(name)}, expected a value such as spring_end.inertia{near}")
     return {name: _quantity(name, quantity) for name, quantity in body.items()}
 
 
-def _quantities(group: str, body: Mapping[str, Any]) -> list[tuple[str, Quantity]]:
+def _quantities(group: str, body: Mapping[str, Any]) -> list[tuple[str, rigs.Quantity]]:
     switches = names(SWITCHES.get(group, ()))
-    allowed = {name.split(".")[1] for name in FIELDS if name.startswith(group + ".")}
+    allowed = {name.split(".")[1] for name in rigs.FIELDS if name.startswith(group + ".")}
     only_keys(body, allowed | switches, group)
     return [
         (f"{group}.{key}", _quantity(f"{group}.{key}", item))
@@ -319,15 +305,15 @@ def _quantities(group: str, body: Mapping[str, Any]) -> list[tuple[str, Quantity
     ]
 
 
-def _quantity(name: str, item: Any) -> Quantity:
-    field: Field = FIELDS[name]
+def _quantity(name: str, item: Any) -> rigs.Quantity:
+    field: rigs.Field = rigs.FIELDS[name]
     body = mapping(item, name, expected=f"{{value: …, unit: {field.unit}}}")
     only_keys(body, names(QUANTITY), name)
     unit(body.get("unit"), f"{name}.unit", field.unit)
     value = number(body.get("value"), name, field.unit)
-    check_value(name, value, where="value")
+    rigs.check_value(name, value, where="value")
     ci95 = interval(body["ci95"], f"{name}.ci95", field.unit) if "ci95" in body else None
-    return Quantity(value, spread(body, name), text(body.get("source", ""), f"{name}.source"), ci95)
+    return rigs.Quantity(value, spread(body, name), text(body.get("source", ""), f"{name}.source"), ci95)
 
 
 def _known_names(items: Any, stated: Collection[str]) -> frozenset[str]:
@@ -340,16 +326,15 @@ def _known_names(items: Any, stated: Collection[str]) -> frozenset[str]:
     return frozenset(items)
 
 
-def _loop(item: Any) -> tuple[str | None, dict[str, Quantity]]:
+def _loop(item: Any) -> tuple[str | None, dict[str, rigs.Quantity]]:
     """Return the kind of a position loop whose targets command the bench, and its gains and limits."""
     if not isinstance(item, Mapping) or "kind" not in item:
         return None, {}
     kind = text(item["kind"], "controller.kind")
-    if kind not in LOOP_FIELDS:
-        raise RigError(
-            f"controller.kind = {quote(kind)}, expected one of {', '.join(LOOP_FIELDS)}", "controller.kind"
-        )
-    only_keys(item, {"kind", *loop_names(kind)}, "controller")
+    if kind not in rigs.LOOP_FIELDS:
+        expected = f"expected one of {', '.join(rigs.LOOP_FIELDS)}"
+        raise RigError(f"controller.kind = {quote(kind)}, {expected}", "controller.kind")
+    only_keys(item, {"kind", *rigs.loop_names(kind)}, "controller")
     names_of = (key for key in item if key != "kind")
     return kind, {f"controller.{key}": _quantity(f"controller.{key}", item[key]) for key in names_of}
 
@@ -363,7 +348,7 @@ def _one_of(choices: Sequence[T], document: Mapping[str, Any], key: str) -> T:
     raise RigError(f"{key} = {quote(item)}, expected {', '.join(map(str, choices))}", key)
 
 
-def _controller(item: Any) -> PositionLoop | None:
+def _controller(item: Any) -> rigs.PositionLoop | None:
     if item is None:
         return None
     body = mapping(item, "controller")
@@ -377,10 +362,10 @@ def _controller(item: Any) -> PositionLoop | None:
             raise RigError(f"{name} = {stated}, expected a finite value >= {least}", name)
     if limit <= 0.0:
         raise RigError(f"controller.limit = {limit:g} N·m, expected a value > 0 N·m", "controller.limit")
-    return PositionLoop(k_p, k_v, limit)
+    return rigs.PositionLoop(k_p, k_v, limit)
 
 
-def _effects(items: Any) -> tuple[EffectSetting, ...]:
+def _effects(items: Any) -> tuple[rigs.EffectSetting, ...]:
     settings = []
     for i, item in enumerate(sequence(items, "effects", "{name: …, parameters: {…}}")):
         body = mapping(item, f"effects[{i}]")
@@ -388,6 +373,6 @@ def _effects(items: Any) -> tuple[EffectSetting, ...]:
         parameters = mapping(body.get("parameters", {}), f"effects[{i}].parameters")
         values = {k: number(v, f"effects[{i}].{k}", "SI") for k, v in parameters.items()}
         name = text(body.get("name", ""), f"effects[{i}].name")
-        settings.append(EffectSetting(name, values, switch(body, f"effects[{i}].guess")))
+        settings.append(rigs.EffectSetting(name, values, switch(body, f"effects[{i}].guess")))
     check_effects(settings)
     return tuple(settings)

@@ -23,11 +23,8 @@ from rsea_ros.records.record import UNITS
 def rig_to_document(rig: Rig) -> dict[str, Any]:
     """Return the rig as the mapping that its YAML file holds."""
     document: dict[str, Any] = {n: getattr(rig, n) for n in ("name", "about", "source", "proximal")}
-    usual = {
-        "linear": False, "ft_end": "spring_end", "encoder_end": "gear_output", "beside_spring": "chassis",
-        "motion": "",
-    }  # fmt: skip
-    document |= {key: getattr(rig, key) for key, value in usual.items() if getattr(rig, key) != value}
+    rare = ("linear", "ft_end", "encoder_end", "beside_spring", "motion")
+    document |= {key: getattr(rig, key) for key in rare if getattr(rig, key) != getattr(Rig, key)}
     if rig.loop:
         document["controller"] = {"kind": rig.loop}
     if rig.hold != "zero":
@@ -68,11 +65,9 @@ def _condition_to_document(c: Condition) -> dict[str, Any]:
 
 def _sensor_to_document(name: str, sensor: Sensor) -> dict[str, Any]:
     body: dict[str, Any] = {"noise": sensor.noise, "quantum": sensor.quantum, "unit": UNITS[name]}
+    doubt = {"doubt": sensor.clock_doubt} if sensor.clock_doubt != CLOCK_DOUBT else {}
     body |= {"zero_unknown": True} if sensor.zero_unknown else {}
-    if sensor.clock or sensor.clock_doubt != CLOCK_DOUBT:
-        body["clock"] = {"value": sensor.clock, "unit": "s"}
-    if sensor.clock_doubt != CLOCK_DOUBT:
-        body["clock"]["doubt"] = sensor.clock_doubt
+    body |= {"clock": {"value": sensor.clock, "unit": "s", **doubt}} if sensor.clock or doubt else {}
     body |= {"delay": {"value": sensor.delay, "unit": "s"}} if sensor.delay else {}
     if known := sensor.filter:
         stated = zip(KINDS[known.kind].items(), known.numbers, strict=True)
@@ -82,14 +77,9 @@ def _sensor_to_document(name: str, sensor: Sensor) -> dict[str, Any]:
 
 
 def _quantity_to_document(name: str, quantity: Quantity) -> dict[str, Any]:
-    body: dict[str, Any] = {"value": float(quantity.value), "unit": FIELDS[name].unit}
-    if quantity.spread:
-        body["spread"] = float(quantity.spread)
-    if quantity.source:
-        body["source"] = quantity.source
-    if quantity.ci95:
-        body["ci95"] = [float(v) for v in quantity.ci95]
-    return body
+    interval = [float(v) for v in quantity.ci95 or ()]
+    more = {"spread": float(quantity.spread), "source": quantity.source, "ci95": interval}
+    return {"value": float(quantity.value), "unit": FIELDS[name].unit} | {k: v for k, v in more.items() if v}
 
 
 def rig_path(name_or_path: str | Path) -> Path:

@@ -18,16 +18,8 @@ from rsea_ros.effects import signal_table as st
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.effects.effect import Effect
 from rsea_ros.errors import RigError
-from rsea_ros.model.drive import (
-    ON_GRID,
-    Drive,
-    LoadStart,
-    SpringStart,
-    drive_from,
-    finer,
-    steps_per_sample,
-    zero_unknown,
-)
+from rsea_ros.model import drive as driven
+from rsea_ros.model.drive import Drive
 from rsea_ros.model.equations import Mechanics, mechanics, train_ratio, with_structure
 from rsea_ros.model.extent import LARGEST, SMALLEST
 from rsea_ros.model.position_loop import STATES, control, loop_parameters, with_command
@@ -154,16 +146,16 @@ class Machine:
 
     def begin(
         self,
-        initial: tuple[float, float] | SpringStart | LoadStart = (0.0, 0.0),
-        spring: SpringStart | None = None,
+        initial: tuple[float, float] | driven.SpringStart | driven.LoadStart = (0.0, 0.0),
+        spring: driven.SpringStart | None = None,
     ) -> None:
         """Set the state to an output angle (rad) and velocity (rad/s), at time zero, with no history.
 
         spring: what its sensor shows at that time, where it is known; as `initial`, all that is known.
         """
-        if isinstance(initial, LoadStart):
+        if isinstance(initial, driven.LoadStart):
             spring, initial = initial.spring, (initial.position, initial.velocity)
-        if isinstance(initial, SpringStart):
+        if isinstance(initial, driven.SpringStart):
             rows = self.linear.outputs
             shown = start_map(self.mechanics, rows[OUTPUT_ROWS.index(initial.channel)])
             self.x[:] = shown @ np.array([initial.value, initial.rate])
@@ -198,10 +190,10 @@ def simulate(rig: Rig, record: Record, *, refine: int = 1) -> dict[str, FloatArr
 
 def drive_of(record: Record, rig: Rig, *, refine: int = 1) -> Drive:
     """Return the drive of a rig from a record. Raises ChannelError where its commands are missing."""
-    return drive_from(
+    return driven.drive_from(
         with_command(record, rig), refine=refine,
         closed_loop=rig.loop is None and rig.controller is not None and "reference" in record,
-        from_rest="position" in record and zero_unknown(record, rig, "position"),
+        from_rest="position" in record and driven.zero_unknown(record, rig, "position"),
         targeted=rig.loop is not None, hold=rig.hold,
     )
 
@@ -367,7 +359,7 @@ def build(rig: Rig, step: float, duration: float, *, in_loop: bool = False) -> M
     tags = {tag for effect, values in active if any(values.values()) for tag in effect.tags}
     return Machine(
         linear, calls, np.zeros(len(linear.phi)), table, np.zeros(states), hanging,
-        "lag" in tags, ON_GRID if "delay" in tags else 0.5, start_maps,
+        "lag" in tags, driven.ON_GRID if "delay" in tags else 0.5, start_maps,
     )  # fmt: skip
 
 
@@ -500,7 +492,7 @@ def _on_short_steps(rig: Rig, drive: Drive, true: dict[str, FloatArray]) -> dict
         return max((math.sqrt(square) / noise for square, noise in squares), default=0.0)
 
     def halved(simulated: _Simulated) -> _Simulated:
-        return (half := finer(simulated[0])), simulate_drive(rig, half)
+        return (half := driven.finer(simulated[0])), simulate_drive(rig, half)
 
     return on_short_steps((drive, true), halved, change)[1]
 
@@ -592,7 +584,7 @@ class Plant:
     def __init__(self, rig: Rig, rate: float, *, seed: int = 0, noise: bool = True) -> None:
         """rate: samples a second. Drifts reach their full size in a minute."""
         self._rig, self._sensors = rig, Sensors(rig if noise else replace(rig, sensors={}))
-        self._count = steps_per_sample(1.0 / rate)
+        self._count = driven.steps_per_sample(1.0 / rate)
         self._step = 1.0 / rate / self._count
         self._command, self._out = np.empty(self._count), np.empty((self._count, len(OUTPUTS)))
         self._rng = sensor_noise(seed)

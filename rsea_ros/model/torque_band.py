@@ -108,13 +108,8 @@ def split(a: FloatArray, b: FloatArray, c: FloatArray, r: FloatArray, corner: fl
     to_band = g * to_high + np.array([1.0, 0.0, 0.0])
     to_low = g * to_band + np.array([0.0, 1.0, 0.0])
     steps = np.array([g * to_high + to_band, g * to_band + to_low])
-    whole, drive = np.zeros((n + 2, n + 2)), np.zeros((n + 2, b.shape[1]))
-    whole[:n, :n], drive[:n] = a, b
-    whole[n:, :n], whole[n:, n:], drive[n:] = (
-        np.outer(steps[:, 2], c @ a),
-        steps[:, :2],
-        np.outer(steps[:, 2], c @ b),
-    )
+    whole = np.block([[a, np.zeros((n, 2))], [np.outer(steps[:, 2], c @ a), steps[:, :2]]])
+    drive = np.vstack([b, np.outer(steps[:, 2], c @ b)])
     p = _stationary(whole, drive @ np.diag(r) @ drive.T)
     return np.array([_variance(row, a, b, c, r, p) for row in (to_high, to_low)])
 

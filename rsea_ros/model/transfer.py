@@ -121,13 +121,10 @@ def frequency_response(rig: Rig, output: Output, hz: FloatArray, port: str = "ge
     m = mechanics(rig)
     p = PORTS.index(port)
     s = 2j * np.pi * np.asarray(hz, dtype=np.float64)[:, None, None]
-    q = (
-        np.linalg.solve(m.mass * s**2 + m.damping * s + m.stiffness, m.ports[p][:, None])[..., 0]
-        @ m.placement.T
-    )
+    moved = np.linalg.solve(m.mass * s**2 + m.damping * s + m.stiffness, m.ports[p][:, None])[..., 0]
+    q = moved @ m.placement.T
     s = s[:, 0, 0]
-    response: ComplexArray = (np.stack([s**0, s, s**2], axis=1) @ output.c * q).sum(axis=1) + output.d[p]
-    return response
+    return np.asarray((np.stack([s**0, s, s**2], axis=1) @ output.c * q).sum(axis=1) + output.d[p])
 
 
 PAPER_FACTOR = 0.292

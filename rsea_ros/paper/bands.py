@@ -10,7 +10,7 @@ is 1 less that of the train), J_sc that part's inertia, J_r = J_m / N^2 and Z = 
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -114,24 +114,22 @@ def limits(rig: Rig) -> tuple[Limit, ...]:
     """Return the limits in which the models of a rig with a free housing meet."""
     clamped = replace(rig, clamped=frozenset(END_NAMES))
     lumped, star = replace(clamped, train="lumped"), replace(clamped, train="star")
-    return (
-        Limit("Both ends clamped: T_d/T_m lumped is T_d/T_m unlumped", "", (1.0,), (_off(lumped, clamped),)),
-        _limit("A heavy load is a clamp: T_d/T_m of the free housing becomes Eq. (4)", "load, kg·m²",
+    rows: tuple[tuple[str, str, tuple[float, ...], Callable[[float], float]], ...] = (
+        ("Both ends clamped: T_d/T_m lumped is T_d/T_m unlumped", "",
+         (1.0,), lambda v: _off(lumped, clamped)),
+        ("A heavy load is a clamp: T_d/T_m of the free housing becomes Eq. (4)", "load, kg·m²",
                (1e2, 1e4, 1e6), lambda v: _off(rig.with_values({"housing_end.inertia": v}), clamped)),
-        _limit("A large ratio at the same J_m: T_p/T_m becomes Eq. (5), planetary", "N",
+        ("A large ratio at the same J_m: T_p/T_m becomes Eq. (5), planetary", "N",
                (5e1, 5e3, 5e5), lambda v: _off_eq_5(clamped.with_values({"gear.ratio": v}))),
-        _limit("A large ratio at the same J_m: T_p/T_m becomes Eq. (5), star", "N",
+        ("A large ratio at the same J_m: T_p/T_m becomes Eq. (5), star", "N",
                (5e1, 5e3, 5e5), lambda v: _off_eq_5(star.with_values({"gear.ratio": v}))),
-        _limit("A large ratio: star and planetary train are one, housing free", "N",
+        ("A large ratio: star and planetary train are one, housing free", "N",
                (5e1, 5e3, 5e5), lambda v: _off(*(replace(rig, train=train).with_values({"gear.ratio": v})
                                                 for train in ("star", "planetary")))),
-        _limit("A stiff spring: T_d/T_p becomes 1", "K_s, N·m/rad",
+        ("A stiff spring: T_d/T_p becomes 1", "K_s, N·m/rad",
                (1e6, 1e8, 1e10), lambda v: _end_to_end_off(clamped.with_values({"spring.stiffness": v}))),
     )  # fmt: skip
-
-
-def _limit(what: str, of: str, values: Sequence[float], error: Callable[[float], float]) -> Limit:
-    return Limit(what, of, tuple(values), tuple(error(v) for v in values))
+    return tuple(Limit(what, of, values, tuple(map(error, values))) for what, of, values, error in rows)
 
 
 def _off(rig: Rig, other: Rig) -> float:

@@ -212,11 +212,10 @@ def trains_table(rows: Sequence[WithTrain], d: SpringDesign) -> Html:
         "from the chassis' inertia: below zero T_d/T_p falls without a resonance, and a heavier chassis "
         f"widens the band. Train: {d.unit.sources['train']}."
     )
-    unknown, known = (
-        "The sense of rotation is not known: both are shown",
-        "Effect of the rotor's spin on the band",
-    )
-    return section(unknown if springs.sense_unknown(rows) else known, shown, caption=caption)
+    title = "Effect of the rotor's spin on the band"
+    if len({row.design.unit.turns > 0.0 for row in rows}) > 1:
+        title = "The sense of rotation is not known: both are shown"
+    return section(title, shown, caption=caption)
 
 
 def springs_table(designs: Sequence[SpringDesign]) -> Html:

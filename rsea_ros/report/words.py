@@ -89,8 +89,7 @@ def number(value: float, digits: int = 3) -> str:
         return "0"
     exponent = math.floor(math.log10(abs(value)))
     if -4 <= exponent < 6:
-        text = f"{value:.{max(0, digits - 1 - exponent)}f}"
-        return minus(text)
+        return minus(f"{value:.{max(0, digits - 1 - exponent)}f}")
     return minus(f"{value:.{digits - 1}e}")
 
 

@@ -42,7 +42,7 @@ def test_a_piece_lies_in_one_span(spans, begin, end, covered):
 def test_a_piece_begins_with_the_first_step_of_a_command():
     drive = SimpleNamespace(step=0.01, hold=4)
     begins = (1.0, 1.019, 1.021, 1.039, 1.061)
-    assert [data_split._piece_start(drive, begin, 0.5) for begin in begins] == [48, 48, 52, 52, 56]
+    assert [data_split.run_up_step(drive, begin, 0.5) for begin in begins] == [48, 48, 52, 52, 56]
 
 
 @pytest.mark.parametrize(

@@ -8,10 +8,10 @@ import pytest
 import scripted
 from scripted import POOLS, Script, script
 
-from rsea_ros.diagnosis import backward_elimination as elimination
-from rsea_ros.diagnosis.backward_elimination import ReducedModels, eliminate_backwards, nested_sequence
+from rsea_ros.diagnosis import stepwise as elimination
 from rsea_ros.diagnosis.evaluation import Selection, trial_of
 from rsea_ros.diagnosis.settings import DEFAULT
+from rsea_ros.diagnosis.stepwise import ReducedModels, eliminate_backwards, nested_sequence
 from rsea_ros.effects.catalogue import effect_named
 
 FRICTION, STRIBECK, LUGRE = "coulomb_friction", "stribeck_friction", "lugre_friction"
@@ -25,7 +25,7 @@ class World:
     def __init__(self, monkeypatch, fits: Script, *effects):
         self.fits, self.guesses, self.impossible = fits, {}, set()
         self.models = ReducedModels([effect_named(n) for n in effects], POOLS, DEFAULT)
-        monkeypatch.setattr(elimination, "fit_candidate", fits.fit)
+        monkeypatch.setattr(elimination.candidate, "fit_candidate", fits.fit)
         monkeypatch.setattr(elimination, "apply", lambda rig, unknowns, theta: (rig, None))
         monkeypatch.setattr(elimination, "view_for", lambda effect, cases, rig, outputs: None)
         monkeypatch.setattr(elimination, "initial_guesses", lambda effect, view: [{"from": "residual"}])

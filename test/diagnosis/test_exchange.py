@@ -5,7 +5,7 @@ import pytest
 from runs import RATE, RIG
 
 from rsea_ros import simulate
-from rsea_ros.diagnosis.backward_elimination import in_exchange
+from rsea_ros.diagnosis.stepwise import in_exchange
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.identification.fit import add_effect, unknowns_of
 from rsea_ros.identification.problem import Problem, case_from

@@ -5,9 +5,8 @@ import pytest
 from runs import RIG, excited, only, trying
 from scripted_scores import model
 
-from rsea_ros.diagnosis.criteria import break_tie, refusal
+from rsea_ros.diagnosis.criteria import break_tie, likelier_by, refusal
 from rsea_ros.diagnosis.diagnose import diagnose
-from rsea_ros.diagnosis.score import likelier_by
 from rsea_ros.diagnosis.settings import DEFAULT
 from rsea_ros.identification.unknowns import Unknown
 from rsea_ros.model.rig_file import load_rig

@@ -10,6 +10,7 @@ from independent.puzzle import noisy_resonance
 from scripted_scores import BLOCKS, model, score
 
 from rsea_ros.diagnosis import score as scores
+from rsea_ros.diagnosis.criteria import likelier_by
 from rsea_ros.diagnosis.data_split import TEST, TRAIN, VALIDATION
 from rsea_ros.diagnosis.settings import BlockSettings
 from rsea_ros.identification.problem import Case, case_from
@@ -204,7 +205,7 @@ def test_data_are_tempered_only_where_both_models_are_far_from_the_floor(ratios,
 )
 def test_the_odds_are_those_of_the_data_and_of_the_known_values(ratio, prior_cost, by):
     one, other = model(ft=ratio, prior_cost=prior_cost), model(ft=2.0, prior_cost=1.0)
-    assert scores.likelier_by(one, other, 5.0) == by
+    assert likelier_by(one, other, 5.0) == by
 
 
 def driven(count, error, *, rate=100.0, bad=()):

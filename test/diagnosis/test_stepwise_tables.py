@@ -58,7 +58,7 @@ class World:
             "leaves_only_noise": lambda model, limit: model.validation.ratio("ft") < limit,
             "vector_of": lambda unknowns, start: (unknowns, start),
         }.items():
-            monkeypatch.setattr(stepwise, name, stand_in)
+            monkeypatch.setattr(stepwise if hasattr(stepwise, name) else stepwise.candidate, name, stand_in)
 
     def refit(self, model, setup):
         assert setup.cases in (self.nominal.cases, self.fits.cases) and setup.iterations == 12

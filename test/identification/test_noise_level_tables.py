@@ -37,7 +37,7 @@ class World:
     def __init__(self, monkeypatch):
         self.white, self.noises = {}, set()
         monkeypatch.setattr(noise_level, "is_noise", lambda case, outputs, n, *_: n in self.noises)
-        monkeypatch.setattr(noise_level, "top_of_band", lambda left, seams: self.white[len(left)])
+        monkeypatch.setattr(noise_level.noises, "top_of_band", lambda left, seams: self.white[len(left)])
 
     def known(self, case):
         return reestimate_noise(case, {n: np.zeros(len(y)) for n, y in case.measured.items()})

@@ -8,34 +8,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rsea_ros.diagnosis import result as results
+from rsea_ros.diagnosis.candidate import main_of
 from rsea_ros.diagnosis.criteria import is_at_floor, verdict_of
 from rsea_ros.diagnosis.evaluation import Evaluated, Examined, HeldOut, Selection, Trial, held_out_data
 from rsea_ros.diagnosis.naming.status import Named, name_causes
-from rsea_ros.diagnosis.naming.weighing import CauseAndRivals, Weighed, weigh
+from rsea_ros.diagnosis.naming.weighing import Weighed, weigh
 from rsea_ros.diagnosis.next_experiment import amplitude_series, separating_run
 from rsea_ros.diagnosis.residual_analysis import misfits, spectrum
-from rsea_ros.diagnosis.result import (
-    Alternative,
-    Cause,
-    CauseParameter,
-    Diagnosis,
-    Experiment,
-    Reason,
-    Rejected,
-    Verdict,
-)
 from rsea_ros.diagnosis.score import Score, gain, lost_above
 from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings, SizeSettings
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.errors import IdentificationError
-from rsea_ros.identification.confidence import (
-    confidence_of,
-    identified_rig,
-    off_rig,
-    overlays_of,
-    parameters_of,
-    undetermined_remarks,
-)
+from rsea_ros.identification import confidence as conf
 from rsea_ros.identification.problem import Case
 from rsea_ros.identification.result import ParameterEstimate, Remark
 from rsea_ros.identification.solver import Pools, solve
@@ -48,7 +33,7 @@ from rsea_ros.records.statistics import Z95
 def cause_of(
     step: tuple[Evaluated, Evaluated], last: Evaluated, channel: str, named: Named,
     settings: DiagnosisSettings,
-) -> Cause:  # fmt: skip
+) -> results.Cause:  # fmt: skip
     """Return an accepted cause: its parameters beside all causes, its gain on the test blocks.
 
     step: the models without and with it. last: the model with all causes. channel: preferred for its gain
@@ -60,9 +45,9 @@ def cause_of(
         channel = max(before.sums, key=lambda n: before.ratio(n) / max(after.ratio(n), 1e-12))
     held_out, interval = gain(with_it.test, without.test, channel, settings.acceptance.resamples)
     train, _ = gain(with_it.train, without.train, channel)
-    return Cause(
+    return results.Cause(
         name=effect.name,
-        parameters=sizes(effect.name, parameters_of(last.solution, last.confidence), settings.sizes),
+        parameters=sizes(effect.name, conf.parameters_of(last.solution, last.confidence), settings.sizes),
         gain_train=train, gain_holdout=held_out, gain_holdout_ci95=interval,
         times_noise=(without.test.ratio(channel), with_it.test.ratio(channel)), equation=effect.equation,
         channel=channel, status=named.status or "leading", probability=named.probability,
@@ -77,16 +62,16 @@ calls nothing."""
 
 def alternative_of(
     instead_of: str, weighed: Weighed, probability: float, settings: DiagnosisSettings
-) -> Alternative:
+) -> results.Alternative:
     """Return a rival of a cause with its size where it acts in that cause's place."""
     claim, evidence = weighed.claim, weighed.evidence
     solution = solve(claim.problem, claim.theta, iterations=0)
-    confidence = confidence_of(solution)
+    confidence = conf.confidence_of(solution)
     resamples = settings.acceptance.resamples
     held_out, interval = gain(claim.with_it, claim.without, evidence.channel, resamples)
-    return Alternative(
+    return results.Alternative(
         name=claim.name, instead_of=instead_of,
-        parameters=sizes(claim.name, parameters_of(solution, confidence), settings.sizes),
+        parameters=sizes(claim.name, conf.parameters_of(solution, confidence), settings.sizes),
         gain_holdout=held_out, gain_holdout_ci95=interval, channel=evidence.channel,
         probability=probability,
     )
@@ -94,28 +79,30 @@ def alternative_of(
 
 def sizes(
     effect: str, estimates: Sequence[ParameterEstimate], rule: SizeSettings
-) -> dict[str, CauseParameter]:
+) -> dict[str, results.CauseParameter]:
     """Return the parameters of an effect among estimates, by their names without the effect's."""
     estimated = {p.name: p for p in estimates}
     known = [(p, estimated.get(f"{effect}.{p.name}")) for p in effect_named(effect).parameters]
     return {p.name: with_model_uncertainty(e, rule, p.low) for p, e in known if e is not None}
 
 
-def needed_sizes(effect: str, last: Evaluated, rule: SizeSettings) -> list[CauseParameter]:
+def needed_sizes(effect: str, last: Evaluated, rule: SizeSettings) -> list[results.CauseParameter]:
     """Return what a cause must have a size of: its main parameter, and other scales that it needs."""
-    known = sizes(effect, parameters_of(last.solution, last.confidence), rule)
+    known = sizes(effect, conf.parameters_of(last.solution, last.confidence), rule)
     main, *others = effect_named(effect).parameters
     scales = [p.name for p in others if p.logarithmic and not p.optional and p.unit != "1"]
     return [known[name] for name in (main.name, *scales) if name in known]
 
 
-def is_known(size: CauseParameter, rule: SizeSettings) -> bool:
+def is_known(size: results.CauseParameter, rule: SizeSettings) -> bool:
     """Return whether a size is known: its interval has one sign, and its ends are not far apart."""
     low, high = sorted(map(abs, size.ci95))
     return size.ci95[0] * size.ci95[1] > 0.0 and high < rule.widest * low
 
 
-def with_model_uncertainty(estimate: ParameterEstimate, rule: SizeSettings, least: float) -> CauseParameter:
+def with_model_uncertainty(
+    estimate: ParameterEstimate, rule: SizeSettings, least: float
+) -> results.CauseParameter:
     """Return an estimate whose interval includes errors that no residual shows.
 
     The fit's interval covers noise only. Two right simulations of one bench differ by about `model_error`
@@ -128,7 +115,7 @@ def with_model_uncertainty(estimate: ParameterEstimate, rule: SizeSettings, leas
         sd = float(np.hypot(sd, CLOCK_DOUBT))
     low, high = (float(np.hypot(end - value, Z95 * sd)) for end in estimate.ci95)
     begin = max(value - low, 0.0) if least >= 0.0 else value - low
-    return CauseParameter(value, estimate.unit, (begin, value + high), estimate.ci95, sd)
+    return results.CauseParameter(value, estimate.unit, (begin, value + high), estimate.ci95, sd)
 
 
 def latest(trials: Sequence[Trial]) -> list[Trial]:
@@ -140,30 +127,31 @@ def latest(trials: Sequence[Trial]) -> list[Trial]:
     return list(best.values())
 
 
-def rejected_trial(trial: Trial, held_out: HeldOut, channel: str) -> Rejected:
+def rejected_trial(trial: Trial, held_out: HeldOut, channel: str) -> results.Rejected:
     """Return a trial with its gain over the model that it was tried beside."""
     size = gain(held_out.score(trial.problem, trial.theta), held_out.score_of(trial.beside), channel)[0]
-    return Rejected(trial.name, size, trial.reason, trial.rival, trial.is_full)
+    return results.Rejected(trial.name, size, trial.reason, trial.rival, trial.is_full)
 
 
 def dropped_cause(
     without: Evaluated, with_it: Evaluated, naming: Mapping[str, Named], channel: str, reached: float
-) -> Rejected:
+) -> results.Rejected:
     """Return an accepted effect that may not be named, with its gain in the channel that it helps most.
 
     reached: of the noise, up to which only that is left.
     """
     named = naming.get(with_it.added)
     if named is None:
-        return Rejected(with_it.added, gain(with_it.test, without.test, channel)[0], "leaves_too_much")
+        gained = gain(with_it.test, without.test, channel)[0]
+        return results.Rejected(with_it.added, gained, "leaves_too_much")
     evidence = named.cause.evidence
-    unsure: Reason = "leaves_too_much" if evidence.left > reached else "not_sure"
-    reason: Reason = "improbable" if evidence.is_sure else unsure
-    return Rejected(with_it.added, evidence.gain, reason, probability=named.probability)
+    unsure: results.Reason = "leaves_too_much" if evidence.left > reached else "not_sure"
+    reason: results.Reason = "improbable" if evidence.is_sure else unsure
+    return results.Rejected(with_it.added, evidence.gain, reason, probability=named.probability)
 
 
 def undetermined_play(
-    selection: Selection, causes: Sequence[Cause], rejected: Sequence[Rejected]
+    selection: Selection, causes: Sequence[results.Cause], rejected: Sequence[results.Rejected]
 ) -> tuple[Remark, ...]:
     """Return the remark on play in a joint's log where it is not a cause, because users look for it."""
     if selection.last.problem.rig.loop is None or any(_is_play(cause.name) for cause in causes):
@@ -172,18 +160,12 @@ def undetermined_play(
     gains = {effect.name: effect.gain_holdout for effect in rejected}
     if not trials or trials[-1].name not in gains:
         return ()
-    return (Remark("play_undetermined", values=(_gap(trials[-1]), gains[trials[-1].name])),)
+    gap, at = main_of(trials[-1].problem, trials[-1].theta, trials[-1].name)
+    return (Remark("play_undetermined", values=(gap.outer(at), gains[trials[-1].name])),)
 
 
 def _is_play(name: str) -> bool:
     return "play" in effect_named(name).tags
-
-
-def _gap(trial: Trial) -> float:
-    """Return the gap of a trial with play, rad."""
-    main = f"{trial.name}.{effect_named(trial.name).main.name}"
-    unknowns = zip(trial.problem.unknowns, trial.theta, strict=True)
-    return next(u.outer(float(value)) for u, value in unknowns if u.name == main)
 
 
 SURE_OF_BOUND = 0.25
@@ -198,17 +180,17 @@ class Outcome:
     dropped: accepted effects that may not be named. named: by cause its status.
     """
 
-    verdict: Verdict
+    verdict: results.Verdict
     channel: str
     stages: Sequence[Evaluated]
-    causes: tuple[Cause, ...]
-    dropped: tuple[Rejected, ...]
+    causes: tuple[results.Cause, ...]
+    dropped: tuple[results.Rejected, ...]
     named: Mapping[str, Named]
 
 
 def outcome_of(
-    places: Sequence[CauseAndRivals], selection: Selection, stages: Sequence[Evaluated], examined: Examined,
-    settings: DiagnosisSettings,
+    places: Sequence[Sequence[Weighed]], selection: Selection, stages: Sequence[Evaluated],
+    examined: Examined, settings: DiagnosisSettings,
 ) -> Outcome:  # fmt: skip
     """Return the verdict on weighed causes, those that are named, and those that may not be."""
     levels = settings.floor
@@ -235,7 +217,7 @@ def outcome_of(
 
 
 def naming_of(
-    places: Sequence[CauseAndRivals], stages: Sequence[Evaluated], settings: DiagnosisSettings
+    places: Sequence[Sequence[Weighed]], stages: Sequence[Evaluated], settings: DiagnosisSettings
 ) -> dict[str, Named]:
     """Return the naming of each cause."""
     *before, at_floor = (is_at_floor(stage.test, settings.floor) for stage in stages)
@@ -306,7 +288,7 @@ def main_channel(test: Score, channel: str, reached: float = DEFAULT.floor.reach
 def conclude(
     selection: Selection, stages: Sequence[Evaluated], examined: Examined, pools: Pools,
     settings: DiagnosisSettings,
-) -> Diagnosis:  # fmt: skip
+) -> results.Diagnosis:  # fmt: skip
     """Weigh and name the causes of a selection. stages: its models, evaluated."""
     places = weigh(selection, stages, held_out_data(selection, examined.holdout), pools, settings)
     outcome = outcome_of(places, selection, stages, examined, settings)
@@ -315,13 +297,13 @@ def conclude(
 
 def _diagnosis(
     selection: Selection, outcome: Outcome, examined: Examined, pools: Pools, settings: DiagnosisSettings
-) -> Diagnosis:
+) -> results.Diagnosis:
     """Return the diagnosis of an outcome, with rivals, rejected effects, and the curves of a report."""
     first, last, main = outcome.stages[0], outcome.stages[-1], outcome.channel
     case, records, rig = selection.cases[0], examined.records, examined.rig
     rejected = _rejections(selection, outcome, pools)
-    baseline, final = (parameters_of(s.solution, s.confidence) for s in (first, last))
-    return Diagnosis(
+    baseline, final = (conf.parameters_of(s.solution, s.confidence) for s in (first, last))
+    return results.Diagnosis(
         verdict=outcome.verdict,
         channel=main,
         rig_name=rig.name,
@@ -329,9 +311,9 @@ def _diagnosis(
         duration=sum(r.stop - r.start for r in records),
         rate=examined.rate,
         faults=examined.faults,
-        baseline_rig=identified_rig(first.solution, baseline),
+        baseline_rig=conf.identified_rig(first.solution, baseline),
         baseline=baseline,
-        extended_rig=identified_rig(last.solution, final),
+        extended_rig=conf.identified_rig(last.solution, final),
         extended=final,
         noise_rms=dict(case.noise),
         residual_rms=_rms(first.test, case),
@@ -347,28 +329,30 @@ def _diagnosis(
         remaining=misfits(case, last.outputs[0], main, rig),
         masked={n: ~counted for n, counted in case.mask.items()},
         settings=settings,
-        before=overlays_of(case, first.outputs[0]),
-        after=overlays_of(case, last.outputs[0]),
+        before=conf.overlays_of(case, first.outputs[0]),
+        after=conf.overlays_of(case, last.outputs[0]),
         spectra=tuple(spectrum(case, first.outputs[0], last.outputs[0], n) for n in first.test.sums),
         remarks=(
-            *off_rig(final),
+            *conf.off_rig(final),
             *undetermined_play(selection, outcome.causes, rejected),
             *_remarks(outcome, case),
         ),
     )
 
 
-def _alternatives(outcome: Outcome, pools: Pools, settings: DiagnosisSettings) -> tuple[Alternative, ...]:
+def _alternatives(
+    outcome: Outcome, pools: Pools, settings: DiagnosisSettings
+) -> tuple[results.Alternative, ...]:
     """Return the rivals of the named causes, each with its size."""
 
-    def alternative(rival: tuple[str, Weighed, float]) -> Alternative:
+    def alternative(rival: tuple[str, Weighed, float]) -> results.Alternative:
         return alternative_of(*rival, settings)
 
     rivals = [(c.name, weighed, p) for c in outcome.causes for weighed, p in outcome.named[c.name].rivals]
     return tuple(pools.fits.map(alternative, rivals))
 
 
-def _rejections(selection: Selection, outcome: Outcome, pools: Pools) -> tuple[Rejected, ...]:
+def _rejections(selection: Selection, outcome: Outcome, pools: Pools) -> tuple[results.Rejected, ...]:
     """Return the accepted effects that may not be named, then all others that were tried."""
     decided = {c.name for c in outcome.causes} | {r.name for r in outcome.dropped}
     others = [t for t in latest(selection.trials) if t.name not in decided]
@@ -385,7 +369,7 @@ def _remarks(outcome: Outcome, case: Case) -> list[Remark]:
     lost, channel = lost_above(case, outcome.channel), outcome.channel
     return [
         *([Remark("also_in_model", unnamed)] if unnamed else []),
-        *undetermined_remarks(last.unknowns, outcome.stages[-1].confidence),
+        *conf.undetermined_remarks(last.unknowns, outcome.stages[-1].confidence),
         *([Remark("coherence_lost", (channel,), (lost,), "Hz")] if lost is not None else []),
         *([Remark("on_measured_angle")] if last.on_angle else []),
         *([Remark("coloured_noise", tuple(sorted(case.coloured)))] if case.coloured else []),
@@ -394,7 +378,7 @@ def _remarks(outcome: Outcome, case: Case) -> list[Remark]:
 
 def _next_experiment(
     selection: Selection, outcome: Outcome, rate: float, settings: DiagnosisSettings
-) -> Experiment | None:
+) -> results.Experiment | None:
     """Return the run that would decide an open question; None without one. rate: of its commands, Hz."""
     last = outcome.stages[-1]
     for cause in outcome.causes:

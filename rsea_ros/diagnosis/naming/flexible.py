@@ -245,14 +245,11 @@ def _with_part(
     cases = tuple(replace(c, drive=d) for c, d in zip(problem.cases, pushed, strict=True))
     outputs = replace(problem, cases=cases).outputs(theta)
     if effect.port is not st.Port.COMMAND:
-        outputs = [{**o, **_kept_channel(b, "motor_torque")} for o, b in zip(outputs, base, strict=True)]
+        unchanged = ({n: y for n, y in b.items() if n == "motor_torque"} for b in base)
+        outputs = [{**o, **kept} for o, kept in zip(outputs, unchanged, strict=True)]
     if effect.port is st.Port.SPRING:
         outputs = [_with_ft_torque(c, o, d) for c, o, d in zip(problem.cases, outputs, pushed, strict=True)]
     return outputs
-
-
-def _kept_channel(base: dict[str, FloatArray], name: str) -> dict[str, FloatArray]:
-    return {name: base[name]} if name in base else {}
 
 
 def _with_ft_torque(case: Case, out: dict[str, FloatArray], pushed: Drive) -> dict[str, FloatArray]:

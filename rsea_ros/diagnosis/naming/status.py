@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 from rsea_ros.diagnosis.naming.evidence import Evidence
-from rsea_ros.diagnosis.naming.weighing import CauseAndRivals, Weighed
+from rsea_ros.diagnosis.naming.weighing import Weighed
 from rsea_ros.diagnosis.result import Status
 from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings, NamingSettings
 from rsea_ros.records.statistics import Z95
@@ -92,25 +92,24 @@ class Named:
 
 
 def name_causes(
-    places: Sequence[CauseAndRivals], at_floor: bool, needed: Collection[str],
+    places: Sequence[Sequence[Weighed]], at_floor: bool, needed: Collection[str],
     settings: DiagnosisSettings = DEFAULT,
 ) -> list[Named]:  # fmt: skip
-    """Return the naming of the cause in each place.
+    """Return the naming of the cause in each place, the first of its place; its rivals follow.
 
     at_floor: all causes together leave only noise (criteria.py). needed: the causes for which they do.
     """
-    return [_name_one(p, at_floor, p.cause.evidence.name in needed, settings) for p in places]
+    return [_name_one(p, at_floor, p[0].evidence.name in needed, settings) for p in places]
 
 
 def _name_one(
-    place: CauseAndRivals, at_floor: bool, is_needed: bool, settings: DiagnosisSettings
+    place: Sequence[Weighed], at_floor: bool, is_needed: bool, settings: DiagnosisSettings
 ) -> Named:
-    every = [place.cause, *place.rivals]
-    evidence = [w.evidence for w in every]
+    evidence = [w.evidence for w in place]
     likely, status = probabilities_and_status(evidence, at_floor, settings, is_needed=is_needed)
-    others = zip(every[1:], likely[1:], strict=True)
+    others = zip(place[1:], likely[1:], strict=True)
     rivals = tuple((w, p) for w, p in others if p >= settings.naming.rival)
-    return Named(place.cause, likely[0], status, rivals)
+    return Named(place[0], likely[0], status, rivals)
 
 
 def probabilities_and_status(

@@ -18,16 +18,8 @@ from functools import partial
 
 import numpy as np
 
-from rsea_ros.diagnosis.candidate import (
-    LAST_GAIN,
-    Candidate,
-    FitSetup,
-    effect_size,
-    fit_candidate,
-    is_apart,
-    prior_cost,
-    without_effect,
-)
+from rsea_ros.diagnosis import candidate
+from rsea_ros.diagnosis.candidate import Candidate, FitSetup
 from rsea_ros.diagnosis.data_split import TRAIN, VALIDATION
 from rsea_ros.diagnosis.evaluation import Evaluated, HeldOut, Selection, Trial
 from rsea_ros.diagnosis.naming.evidence import Claim, Evidence, evidence_for, is_at_edge
@@ -71,8 +63,8 @@ def weigh_rivals(selection: Selection, claim: Claim, held_out: HeldOut, pools: P
         """Return trials whose size ended at no bound, where a law imitates another; scores and weights."""
         runs = [t for t in tried if t.name == claim.name or not is_at_edge(t.problem, t.theta, t.name, near)]
         scores = list(pools.fits.map(lambda t: held_out.score(t.problem, t.theta), runs))
-        priors = [trust * prior_cost(t.problem, t.theta) for t in runs]
-        return runs, scores, _stack(scores, priors, [effect_size(t.name) for t in runs], settings)
+        priors = [trust * candidate.prior_cost(t.problem, t.theta) for t in runs]
+        return runs, scores, _stack(scores, priors, [candidate.effect_size(t.name) for t in runs], settings)
 
     mine = Trial(claim.name, selection.last, claim.problem, claim.theta, True, "replaced")
     close = dict[str, Trial]()
@@ -110,13 +102,13 @@ def _beside_all_causes(
 
     What came later still hid in the residual when these were tried. No larger law that may be a smaller one.
     """
-    rest, _ = without_effect(claim.problem, claim.theta, claim.name)
-    apart = [t for t in tried if is_apart(effect_named(t.name), rest)]
+    rest, _ = candidate.without_effect(claim.problem, claim.theta, claim.name)
+    apart = [t for t in tried if candidate.is_apart(effect_named(t.name), rest)]
     ends = pools.fits.map(lambda t: _in_place_of(claim, t, selection, pools).solution, apart)
     return [
         replace(t, problem=end.problem, theta=end.theta)
         for t, end in zip(apart, ends, strict=True)
-        if effect_size(t.name) <= effect_size(claim.name) or not may_be_less(end, t.name)
+        if candidate.effect_size(t.name) <= candidate.effect_size(claim.name) or not may_be_less(end, t.name)
     ]
 
 
@@ -141,9 +133,9 @@ def _in_place_of(claim: Claim, trial: Trial, selection: Selection, pools: Pools)
     for the other.
     """
     settings, last = selection.last.settings, selection.last
-    blocks = (*TRAIN, *VALIDATION)
-    setup = FitSetup(selection.cases, settings, pools.run, last.validation, blocks=blocks, gain=LAST_GAIN)
-    problem, theta = without_effect(claim.problem, claim.theta, claim.name)
+    seen, gain = (*TRAIN, *VALIDATION), candidate.LAST_GAIN
+    setup = FitSetup(selection.cases, settings, pools.run, last.validation, blocks=seen, gain=gain)
+    problem, theta = candidate.without_effect(claim.problem, claim.theta, claim.name)
     reached = list(zip(trial.problem.unknowns, trial.theta, strict=True))
     own = [(u, float(at)) for u, at in reached if u.name.startswith(trial.name + ".")]
     (effect,) = (e for e in trial.problem.rig.effects if e.name == trial.name)
@@ -156,7 +148,7 @@ def _in_place_of(claim: Claim, trial: Trial, selection: Selection, pools: Pools)
     theta = np.array([*theta, *(at for _, at in own)])
     values = {u.name: u.outer(float(at)) for u, at in reached}
     starts, masked = (theta, theta_with(problem.unknowns, theta, values)), setup.mask(problem)
-    return fit_candidate(setup, problem, min(starts, key=lambda t: power(masked.residual(t))))
+    return candidate.fit_candidate(setup, problem, min(starts, key=lambda t: power(masked.residual(t))))
 
 
 def _stack(
@@ -199,29 +191,15 @@ class Weighed:
     evidence: Evidence
 
 
-@dataclass(frozen=True)
-class CauseAndRivals:
-    """A cause and its rivals, each with its evidence."""
-
-    cause: Weighed
-    rivals: tuple[Weighed, ...]
-
-
 def weigh(
     selection: Selection, stages: Sequence[Evaluated], held_out: HeldOut, pools: Pools,
     settings: DiagnosisSettings,
-) -> list[CauseAndRivals]:  # fmt: skip
-    """Return every accepted cause and its rivals with the evidence for each, in the order of the stages."""
+) -> list[list[Weighed]]:  # fmt: skip
+    """Return every accepted cause and behind it its rivals, each with its evidence, stage after stage."""
     contested = contests(selection, stages, held_out, pools)
     claims = list(itertools.chain.from_iterable(contested))
     weigh_claim = partial(evidence_for, cases=selection.cases, settings=settings, run=pools.run)
     evidence_by_claim = {id(c): e for c, e in zip(claims, pools.fits.map(weigh_claim, claims), strict=True)}
 
-    def with_evidence(group: Sequence[Claim]) -> tuple[Weighed, ...]:
-        return tuple(Weighed(c, e) for c in group if (e := evidence_by_claim[id(c)]) is not None)
-
-    return [
-        CauseAndRivals(cause[0], with_evidence(rivals))
-        for claim, *rivals in contested
-        if (cause := with_evidence([claim]))
-    ]
+    known = ([(c, evidence_by_claim[id(c)]) for c in group] for group in contested)
+    return [[Weighed(c, e) for c, e in place if e is not None] for place in known if place[0][1] is not None]

@@ -16,15 +16,7 @@ from numba.extending import intrinsic
 
 from rsea_ros.compiler import njit
 from rsea_ros.errors import check_kind
-from rsea_ros.model.observer import log as logs
-from rsea_ros.model.observer.assemble import (
-    Consistency,
-    Noise,
-    assemble,
-    consistency,
-    noise_of,
-    without_delay,
-)
+from rsea_ros.model.observer import assemble as assembly, log as logs
 from rsea_ros.model.observer.filter import LACK, SIGMA, FilterModel, FilterState, inner
 from rsea_ros.model.observer.transition import transition
 from rsea_ros.model.rig import Rig
@@ -155,11 +147,11 @@ class Observer:
     _score: FloatArray
     _newest: float
 
-    def __init__(self, rig: Rig, noise: Noise | None = None, *, hold: float = math.inf,
+    def __init__(self, rig: Rig, noise: assembly.Noise | None = None, *, hold: float = math.inf,
                  duration: float = 60.0, learns: bool = True) -> None:  # fmt: skip
         check_kind("rig", rig, Rig, "a Rig (rsea.load_rig)")
-        self._rig, self._delay = without_delay(rig)
-        self._noise = noise_of(rig) if noise is None else noise
+        self._rig, self._delay = assembly.without_delay(rig)
+        self._noise = assembly.noise_of(rig) if noise is None else noise
         self._hold, self._duration, self._learns = hold, duration, learns
         self._estimate = np.zeros(2 * SIGMA)
         self.restarts = -1
@@ -187,12 +179,12 @@ class Observer:
         """Number of samples that came too late."""
         return int(self._log.place[logs.REFUSED])
 
-    def consistency(self) -> dict[str, Consistency]:
+    def consistency(self) -> dict[str, assembly.Consistency]:
         """Return for each channel the innovations since the last call over their expected size."""
         now = self.scores()
         change = now - self._score
         self._score = now
-        return consistency(change)
+        return assembly.consistency(change)
 
     def scores(self) -> FloatArray:
         """Return the sums since the start of which `consistency` takes differences, shape (3, 3)."""
@@ -213,7 +205,7 @@ class Observer:
         return ErrorModel(a, k, heard, c, float(self._state.estimate[SIGMA]))
 
     def _begin(self) -> None:
-        self._model, self._state = assemble(
+        self._model, self._state = assembly.assemble(
             self._rig, self._noise, hold=self._hold, duration=self._duration, learns=self._learns
         )
         self._log = logs.empty_log(len(self._state.whole))

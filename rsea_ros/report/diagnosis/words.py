@@ -279,8 +279,7 @@ _MOST = 3
 
 def tried(diagnosis: Diagnosis) -> str:
     """Return `31 of the catalogue's 33 causes`: the others cannot act on this rig, or were left out."""
-    number = len(diagnosis.causes) + len(diagnosis.rejected)
-    return f"{number} of the catalogue's {len(catalogue())} causes"
+    return f"{len(diagnosis.causes) + len(diagnosis.rejected)} of the catalogue's {len(catalogue())} causes"
 
 
 def fitted_rivals(diagnosis: Diagnosis) -> list[Rejected]:

@@ -60,8 +60,7 @@ def pauses_of(t: FloatArray) -> dict[int, float]:
     """
     steps = np.diff(t)
     usual = float(np.median(steps)) if len(steps) else 0.0
-    behind = np.flatnonzero(steps > max(_PAUSE, _PERIODS * usual))
-    return {int(k) + 1: float(steps[k]) for k in behind}
+    return {int(k) + 1: float(steps[k]) for k in np.flatnonzero(steps > max(_PAUSE, _PERIODS * usual))}
 
 
 def without(pauses: Mapping[int, float], t: FloatArray) -> FloatArray:

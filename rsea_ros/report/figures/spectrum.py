@@ -50,8 +50,7 @@ def in_bands(frequency: FloatArray, values: FloatArray) -> tuple[FloatArray, Flo
     bands = np.floor(np.log10(frequency) * _PER_DECADE)
     starts = np.flatnonzero(np.diff(bands, prepend=-np.inf))
     count = np.diff(np.append(starts, len(frequency)))
-    power = np.add.reduceat(values**2, starts) / count
-    return np.add.reduceat(frequency, starts) / count, np.sqrt(power)
+    return np.add.reduceat(frequency, starts) / count, np.sqrt(np.add.reduceat(values**2, starts) / count)
 
 
 def peak_above(frequency: FloatArray, values: FloatArray, noise: float) -> str:

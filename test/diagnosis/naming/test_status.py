@@ -23,7 +23,7 @@ from rsea_ros.diagnosis.naming.status import (
     probability,
     status_of,
 )
-from rsea_ros.diagnosis.naming.weighing import CauseAndRivals, Weighed
+from rsea_ros.diagnosis.naming.weighing import Weighed
 from rsea_ros.diagnosis.result import CauseParameter
 from rsea_ros.diagnosis.score import Score
 from rsea_ros.diagnosis.settings import DEFAULT
@@ -222,7 +222,7 @@ def test_where_only_noise_is_left_already_a_cause_is_named_only_for_a_sure_gain(
     steps = zip(("", "backlash", "damping_drift"), left, strict=True)
     stages = [SimpleNamespace(added=n, test=score_of({"ft": level})) for n, level in steps]
     evidence = replace(RIGHT, name=name, is_sure=False)
-    place = CauseAndRivals(Weighed(None, evidence), ())
+    place = [Weighed(None, evidence)]
     is_needless = (name == "damping_drift" and left[1] == 1.0) or left[2] > 1.0
     assert (outcome.naming_of([place], stages, DEFAULT)[name].status is None) == is_needless
 
