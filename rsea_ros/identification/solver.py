@@ -171,7 +171,7 @@ def solve(problem: Problem, theta: FloatArray | None = None, *, iterations: int 
             kept = cost - trial_cost > _AS_PROMISED * (cost - cost_of(residual + along, trial))
             if is_fresh and not kept:
                 bent = _along_the_bend(problem, theta, residual, trial, along, matrix, scaled)
-                bent_residual = problem.residual(bent)
+                bent_residual = trial_residual if bent is trial else problem.residual(bent)
                 bent_cost = cost_of(bent_residual, bent)
                 if bent_cost < trial_cost:
                     trial, trial_residual, trial_cost = bent, bent_residual, bent_cost

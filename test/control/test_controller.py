@@ -256,7 +256,7 @@ def test_a_restart_under_a_desired_torque_lets_the_error_in_slowly(lost):
 
 def test_a_desired_torque_that_ceases_for_a_sample_is_no_fall_and_no_overshoot():
     """As of a sender that pauses for 50 ms. The limit stood at the torque of the restart: 15.5 N m."""
-    loop = TorqueController(RIG, RATE)
+    loop = controller()
 
     def answer(k, read):
         if k in (140, 141):

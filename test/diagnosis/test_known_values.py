@@ -106,7 +106,7 @@ def torque_chirp_of(values, effects, seed=3, seconds=5.0):
 
 def test_two_effects_are_named_where_one_fits_as_well_only_far_from_the_rig():
     effects = {LAG: {"time_constant": 0.02}, DELAY: {"delay": 4e-3}}
-    record = torque_chirp_of({INERTIA: 0.011, "rotor.reflected_damping": 10.0}, effects, seconds=10.0)
+    record = torque_chirp_of({INERTIA: 0.011, "rotor.reflected_damping": 10.0}, effects, seconds=6.0)
     found = diagnose([record], SEA, settings=SETTINGS)
     assert {(c.name, c.status) for c in found.causes} == {(LAG, "confirmed"), (DELAY, "confirmed")}
     sizes = {n: p.value for c in found.causes for n, p in c.parameters.items()}
