@@ -87,7 +87,7 @@ def test_strong_cogging_is_named_with_its_size():
 def test_a_resonance_is_found_in_the_noise_and_what_the_noise_hides_is_said():
     """The paper's own puzzle (section 3.2.2): out of sync at 19 Hz, a bump at 33 Hz."""
     tried = trying("structural_resonance", "command_delay")  # which turns the phase as much at 19 Hz
-    diagnosis = diagnose([noisy_resonance(1, 36.0)], load_rig("paper_moving_output"), settings=tried)
+    diagnosis = diagnose([noisy_resonance(3, 36.0)], load_rig("paper_moving_output"), settings=tried)
     assert [cause.name for cause in diagnosis.causes] == ["structural_resonance"]
     for name in ("frequency", "participation"):
         low, high = diagnosis.causes[0].parameters[name].ci95
