@@ -6,6 +6,7 @@ the test blocks (naming/weighing.py), and named with gain and probability where 
 """
 
 from collections.abc import Collection, Sequence
+from contextlib import suppress
 from dataclasses import replace
 
 from rsea_ros.checks.carried import check_diagnosable
@@ -20,7 +21,7 @@ from rsea_ros.diagnosis.stepwise import eliminate_backwards, go_on, select_stepw
 from rsea_ros.diagnosis.stretches import in_stretches, stretches_of
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.effects.effect import Effect
-from rsea_ros.errors import IdentificationError
+from rsea_ros.errors import IdentificationError, RseaError
 from rsea_ros.identification.confidence import stated_differences, torque_scale
 from rsea_ros.identification.fit import as_recorded, unknowns_of, with_even_clocks
 from rsea_ros.identification.identify import identify, lost_behind
@@ -64,9 +65,10 @@ def diagnose(
         check_diagnosable(record)
     rig, unseen = as_recorded(rig, records)
     result = _diagnosed(records, rig, holdout, tell, settings)
-    if not result.at_noise_floor and (start := _held(records, rig, result)) is not None:
-        simulated = _diagnosed(records, replace(rig, motion="simulated"), holdout, tell, settings, start)
-        result = min(result, simulated, key=_over_noise)
+    with suppress(RseaError):  # a simulation asks for more than a torque along the motion does
+        if not result.at_noise_floor and (start := _held(records, rig, result)) is not None:
+            simulated = _diagnosed(records, replace(rig, motion="simulated"), holdout, tell, settings, start)
+            result = min(result, simulated, key=_over_noise)
     return replace(result, remarks=(*unseen, *result.remarks))
 
 
@@ -107,10 +109,7 @@ def _held(records: Sequence[Record], rig: Rig, result: Diagnosis) -> Rig | None:
     is_held = rig["spring_end.gravity"] > 0.0 or rig["spring_end.stiffness"] > 0.0
     if rig.motion or not (is_held and is_inverse(rig)):
         return None
-    try:
-        found = identify(records, replace(result.extended_rig, motion="simulated"), of_misfit=False)
-    except IdentificationError:  # the motor's torque is known, its command is not
-        return None
+    found = identify(records, replace(result.extended_rig, motion="simulated"), of_misfit=False)
     return found.rig if found.fit_percent["position"] > _FOLLOWS else None
 
 

@@ -188,13 +188,14 @@ def select_stepwise(
 ) -> Selection:  # fmt: skip
     """Select up to max_causes causes among some effects, the one that explains most first.
 
-    start: a rig whose values the first fits begin with, and whose effects are the first causes.
+    start: a rig whose values the first fits begin with, and whose effects, of those tried, come first.
     """
     setup = FitSetup(nominal.cases, settings, pools.run)
     models = [_fit_nominal(nominal, setup, start)]
+    searched = {e.name: e for e in effects}
     for cause in start.effects if start else ():
-        if start and cause.name not in nominal.acting:
-            last, effect = models[-1], next(e for e in effects if e.name == cause.name)
+        if start and cause.name in searched.keys() - set(nominal.acting):
+            last, effect = models[-1], searched[cause.name]
             problem, _ = add_effect(last.problem, last.solution.theta, effect, dict(cause.parameters))
             model = candidate.fit_candidate(setup, problem, vector_of(problem.unknowns, start))
             models.append(candidate.refit(candidate.with_noise_reestimated(model), setup))
