@@ -5,7 +5,7 @@ from graphlib import TopologicalSorter
 
 from import_graph import MODULES, ROOT, imports, name_of, nodes, tree_of
 
-LINES, FILES, SMALL, LOOSE = 63_632, 354, 20, 8
+LINES, FILES, SMALL, LOOSE = 63_622, 354, 20, 8
 """At most: gross lines and files of rsea_ros and msg_adapters, files of up to 30 code lines (effects and
 extension apart), files at the root of rsea_ros. They may fall. What raises one needs a decision
 that says what went for it."""

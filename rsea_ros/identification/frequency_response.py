@@ -38,13 +38,11 @@ import numpy as np
 from numpy.fft import irfft, rfft
 from numpy.polynomial.polynomial import polyval
 
-from rsea_ros.effects import signal_table as st
 from rsea_ros.identification import local_polynomial as lpm
 from rsea_ros.identification.problem import FEWEST
 from rsea_ros.identification.result import FrequencyResponse
-from rsea_ros.model.equations import Mechanics
 from rsea_ros.model.position_loop import close_loop
-from rsea_ros.model.propagator import encoder_row, read_row, state_space
+from rsea_ros.model.propagator import OUTPUT_ROWS, encoder_row, output_rows, state_space
 from rsea_ros.model.rig import Rig, Sensor
 from rsea_ros.records.record import ComplexArray, FloatArray, IntArray, Record
 from rsea_ros.records.statistics import hann, next_fast_length, runs_of
@@ -391,16 +389,8 @@ def model_responses(rig: Rig, frequencies: Mapping[str, FloatArray]) -> dict[str
         solved = np.linalg.solve(
             s[:, None, None] * eye - system.a, np.broadcast_to(system.b[:, :1], (len(s), len(eye), 1))
         )[:, :, 0]
-        response = np.einsum("j,kj->k", _output_row(rig, output, system.mechanics), solved)
+        row = output_rows(rig, system.mechanics)[OUTPUT_ROWS.index(output)]
+        response = np.einsum("j,kj->k", row, solved)
         plant = np.einsum("j,kj->k", encoder_row(rig, system.mechanics), solved)
         responses[output] = response if rig.loop is None else close_loop(rig, plant, response, s)
     return responses
-
-
-def _output_row(rig: Rig, output: str, m: Mechanics) -> FloatArray:
-    if output == "ft":
-        deflection, rate = (read_row(rig, m, signal) for signal in (st.DEFLECTION, st.DEFLECTION_RATE))
-        return rig["spring.stiffness"] * deflection + rig["spring.damping"] * rate
-    if output == "deflection":
-        return read_row(rig, m, st.DEFLECTION)
-    return encoder_row(rig, m, is_rate=output == "velocity")

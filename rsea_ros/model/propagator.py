@@ -96,7 +96,7 @@ def propagator(rig: Rig, h: float, reads: Iterable[int], m: Mechanics | None = N
         phi=np.ascontiguousarray(exponential[:n, :n]), g=np.ascontiguousarray(exponential[:n, n:]),
         rows=rows, matrix=np.ascontiguousarray(matrix),
         spans=np.array([read_row(rig, system.mechanics, s) for s in (st.GEAR_VELOCITY, st.DEFLECTION)]),
-        outputs=_outputs(rig, system.mechanics),
+        outputs=output_rows(rig, system.mechanics),
         outside=np.array(
             [rig[f"{end}.{key}"] for key in ("gravity", "gravity_angle") for end in END_NAMES] + against
         ),
@@ -143,7 +143,7 @@ OUTPUT_ROWS = ("position", "velocity", "ft", "deflection")
 """What the rows of `Linear.outputs` show."""
 
 
-def _outputs(rig: Rig, m: Mechanics) -> FloatArray:
+def output_rows(rig: Rig, m: Mechanics) -> FloatArray:
     """Return OUTPUT_ROWS: position, velocity, the linear torque at the F/T sensor, and deflection."""
     position, velocity = encoder_row(rig, m), encoder_row(rig, m, is_rate=True)
     deflection, rate = (read_row(rig, m, s) for s in (st.DEFLECTION, st.DEFLECTION_RATE))

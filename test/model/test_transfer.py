@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from random_rigs import RIG_NAMES, WITH_SPRING, rigs
 
 from rsea_ros.errors import RigError
+from rsea_ros.identification.frequency_response import model_response
 from rsea_ros.model import outputs, transfer
 from rsea_ros.model.equations import PORTS
 from rsea_ros.model.propagator import state_space
@@ -140,3 +141,12 @@ def test_the_damper_turns_the_phase_of_what_the_sensor_sees():
 def test_the_element_of_a_rigid_spring_is_refused():
     with pytest.raises(RigError, match=r"bare_drive: spring.rigid = True, expected a spring"):
         distal_per_motor(load_rig("bare_drive"), "element")
+
+
+@pytest.mark.parametrize("end", ["housing_end", "spring_end"])
+@pytest.mark.parametrize("name", ["separate_stiffnesses", "two_moving_outputs"])
+def test_a_fit_starts_from_the_response_of_the_end_with_the_sensor(name, end):
+    """It was the spring's wherever the F/T sensor is: a quarter off at 40 Hz."""
+    rig = replace(load_rig(name), ft_end=end)
+    ours, expected = model_response(rig, "ft", HZ), transfer.end_response(rig, HZ, end)
+    np.testing.assert_allclose(ours, expected, rtol=1e-6)
