@@ -215,7 +215,8 @@ def test_another_motor_of_the_same_id_is_not_switched_on(wire, listener, service
     wire.bench.ask("set", temperature=90)
     listener.until(wire.latched)
     since = wire.bench.ask("set", temperature=32, torque_limit=500)["t"]
-    answer = wire.trigger(service)
+    answers = iter(lambda: wire.trigger(service), None)
+    answer = next(a for a in answers if a.success or "no reply" not in a.message)  # but of a bench that stalls
     assert not answer.success and "expected 9.99" in answer.message
     assert not any(on and goal for _, goal, on in wire.bench.log(since)["torque"]) and not wire.goal()[1]
     wire.bench.ask("set", torque_limit=620)
