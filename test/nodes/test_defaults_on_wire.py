@@ -215,9 +215,14 @@ def test_another_motor_of_the_same_id_is_not_switched_on(wire, listener, service
     wire.bench.ask("set", temperature=90)
     listener.until(wire.latched)
     since = wire.bench.ask("set", temperature=32, torque_limit=500)["t"]
-    answers = iter(lambda: wire.trigger(service), None)
-    answer = next(a for a in answers if a.success or "no reply" not in a.message)  # but of a bench that stalls
-    assert not answer.success and "expected 9.99" in answer.message
+    answers = []
+
+    def is_told():
+        answers.append(wire.trigger(service))
+        return answers[-1].success or "no reply" not in answers[-1].message  # as of a bench that stalls
+
+    listener.until(is_told)
+    assert not answers[-1].success and "expected 9.99" in answers[-1].message
     assert not any(on and goal for _, goal, on in wire.bench.log(since)["torque"]) and not wire.goal()[1]
     wire.bench.ask("set", torque_limit=620)
 
