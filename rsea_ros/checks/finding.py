@@ -79,7 +79,7 @@ def unused_sentence(record: Record, rig: Rig) -> str:
     """
     beside = {"velocity"} if is_inverse(rig) else set()
     unused = ", ".join(n for n in record.channels if not rig.measures(n) or n in beside)
-    judge = "a rig without a spring" if rig.rigid_spring else "a measured motion"
+    judge = "judged by its torque, a rig without a spring" if rig.rigid_spring else "a measured motion"
     said = [f"{judge} makes no use of {unused}"] if unused else []
     targets = [n for n in COMMANDS if n in record and n != "reference"]
     if targets and rig.loop not in (None, "mit") and "reference" in record:

@@ -66,7 +66,7 @@ def diagnose(
     rig, unseen = as_recorded(rig, records)
     result = _diagnosed(records, rig, holdout, tell, settings)
     with suppress(RseaError):  # a simulation asks for more than a torque along the motion does
-        if not result.at_noise_floor and (start := _held(records, rig, result)) is not None:
+        if not result.at_noise_floor and (start := _rig_that_follows(records, rig, result)) is not None:
             simulated = _diagnosed(records, replace(rig, motion="simulated"), holdout, tell, settings, start)
             result = min(result, simulated, key=_over_noise)
     return replace(result, remarks=(*unseen, *result.remarks))
@@ -100,7 +100,7 @@ _FOLLOWS = 90.0
 """Percent of fit to the position from which a simulation follows a motion well enough to be searched."""
 
 
-def _held(records: Sequence[Record], rig: Rig, result: Diagnosis) -> Rig | None:
+def _rig_that_follows(records: Sequence[Record], rig: Rig, result: Diagnosis) -> Rig | None:
     """Return what was found along the motion of a rigid joint, where a simulation of it follows the motion.
 
     A weight or a spring holds the joint then. The filter of a measured motion smears each reversal, and the

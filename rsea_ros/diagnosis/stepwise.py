@@ -192,16 +192,13 @@ def select_stepwise(
     """
     setup = FitSetup(nominal.cases, settings, pools.run)
     models = [_fit_nominal(nominal, setup, start)]
-    searched = {e.name: e for e in effects}
-    for cause in start.effects if start else ():
-        if start and cause.name in searched.keys() - set(nominal.acting):
-            last, effect = models[-1], searched[cause.name]
-            problem, _ = add_effect(last.problem, last.solution.theta, effect, dict(cause.parameters))
-            model = candidate.fit_candidate(setup, problem, vector_of(problem.unknowns, start))
-            models.append(candidate.refit(candidate.with_noise_reestimated(model), setup))
-    cases = models[-1].cases
-    selection = Selection((*(candidate.rescore(m, cases) for m in models[:-1]), models[-1]))
-    return go_on(selection, effects, pools, tell, settings)
+    known, searched = start or nominal.rig, {e.name: e for e in effects if e.name not in nominal.acting}
+    for cause in (e for e in known.effects if e.name in searched):
+        last, effect = models[-1], searched[cause.name]
+        problem, _ = add_effect(last.problem, last.solution.theta, effect, dict(cause.parameters))
+        model = candidate.fit_candidate(setup, problem, vector_of(problem.unknowns, known))
+        models.append(candidate.refit(candidate.with_noise_reestimated(model), setup))
+    return go_on(Selection(_on_the_last_noise(models)), effects, pools, tell, settings)
 
 
 def go_on(
@@ -221,8 +218,12 @@ def go_on(
         models.append(candidate.on_fine_steps(candidate.refit(accepted, setup), setup))
     if len(models) == len(selection.models):
         return replace(selection, trials=tuple(trials))
-    cases = models[-1].cases
-    return Selection((*(candidate.rescore(m, cases) for m in models[:-1]), models[-1]), tuple(trials))
+    return Selection(_on_the_last_noise(models), tuple(trials))
+
+
+def _on_the_last_noise(models: Sequence[Candidate]) -> tuple[Candidate, ...]:
+    """Return models scored against the noise that the last of them shows."""
+    return (*(candidate.rescore(m, models[-1].cases) for m in models[:-1]), models[-1])
 
 
 def _fit_nominal(nominal: Problem, setup: FitSetup, start: Rig | None) -> Candidate:

@@ -89,7 +89,6 @@ def propagator(rig: Rig, h: float, reads: Iterable[int], m: Mechanics | None = N
     if reads_load:
         spring, output = {st.DEFLECTION, st.DEFLECTION_RATE}, {st.DISTAL_ANGLE, st.DISTAL_VELOCITY}
         reads |= output if rig.rigid_spring else spring
-    against = [rig[f"spring_end.{key}"] if rig.rigid_spring else 0.0 for key in ("stiffness", "damping")]
     rows = np.array(sorted(reads - {st.LOAD}), dtype=np.int64)
     matrix = np.array([read_row(rig, system.mechanics, int(r)) for r in rows]).reshape(len(rows), n)
     return Linear(
@@ -97,9 +96,10 @@ def propagator(rig: Rig, h: float, reads: Iterable[int], m: Mechanics | None = N
         rows=rows, matrix=np.ascontiguousarray(matrix),
         spans=np.array([read_row(rig, system.mechanics, s) for s in (st.GEAR_VELOCITY, st.DEFLECTION)]),
         outputs=output_rows(rig, system.mechanics),
-        outside=np.array(
-            [rig[f"{end}.{key}"] for key in ("gravity", "gravity_angle") for end in END_NAMES] + against
-        ),
+        outside=np.array([
+            *(rig[f"{end}.{key}"] for key in ("gravity", "gravity_angle") for end in END_NAMES),
+            rig["spring_end.stiffness"], rig["spring_end.damping"],
+        ]),
         reads_load=reads_load, rest=(0.0,) * n,
     )
 

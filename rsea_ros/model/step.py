@@ -50,7 +50,7 @@ class Linear(NamedTuple):
     phi (n, n), g (n, 5); rows: signals that are read, matrix (rows, n) reads them; spans (2, n): gear
     velocity and deflection; outputs (4, n): position, velocity, the linear torque at the F/T sensor and
     deflection; outside (6,): m g l of the ends, N m, how far from hanging each is at angle zero, rad, then
-    stiffness and damping of what a rigid joint's output stands against, N m/rad and N m s/rad.
+    stiffness and damping of what the spring's end stands against, N m/rad and N m s/rad.
     rest: n zeros. The step is compiled for each length of it, and keeps the state in registers.
     """
 
@@ -166,13 +166,12 @@ def _read(linear, x, s):  # type: ignore[no-untyped-def]
         s[st.LOAD] = s[st.K_S] * s[st.DEFLECTION] + s[st.B_S] * s[st.DEFLECTION_RATE] + s[st.SPRING_TORQUE]
     for i in range(_FORCES):
         s[st.FIRST_FORCE + i] = 0.0
-    outside = linear.outside
-    if outside[0] != 0.0:
-        s[st.HOUSING_TORQUE] = -outside[0] * np.sin(s[st.HOUSING_ANGLE] + outside[2])
-    if outside[1] != 0.0:
-        s[st.DISTAL_TORQUE] = -outside[1] * np.sin(s[st.DISTAL_ANGLE] + outside[3])
+    if linear.outside[0] != 0.0:
+        s[st.HOUSING_TORQUE] = -linear.outside[0] * np.sin(s[st.HOUSING_ANGLE] + linear.outside[2])
+    if linear.outside[1] != 0.0:
+        s[st.DISTAL_TORQUE] = -linear.outside[1] * np.sin(s[st.DISTAL_ANGLE] + linear.outside[3])
     if linear.reads_load and s[st.K_S] == 0.0:
-        held = outside[4] * s[st.DISTAL_ANGLE] + outside[5] * s[st.DISTAL_VELOCITY]
+        held = linear.outside[4] * s[st.DISTAL_ANGLE] + linear.outside[5] * s[st.DISTAL_VELOCITY]
         s[st.LOAD] = held - s[st.DISTAL_TORQUE]
 
 

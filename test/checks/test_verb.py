@@ -131,7 +131,7 @@ def test_identify_questions_the_rig(bag, tmp_path, capsys):
     assert "is this the right rig?" in " ".join(" ".join(lines[1:4]).split())
 
 
-SENTENCE = "a rig without a spring makes no use of velocity, ft"
+SENTENCE = "judged by its torque, a rig without a spring makes no use of velocity, ft"
 
 
 @pytest.fixture(scope="module")
